@@ -1,4 +1,4 @@
-//! Recordings of few postures: what they cannot say is said, and what happened in them is not missed.
+//! Recordings of few postures: what they cannot show is stated, and faults in them are not missed.
 
 use serde_json::Value;
 
@@ -99,6 +99,29 @@ fn finding<'a>(report: &'a Value, id: &str) -> Option<&'a Value> {
     all.find(|f| f["id"] == id)
 }
 
+/// What is said to have changed, or to be missing.
+fn named(report: &Value) -> Option<&Value> {
+    finding(report, "changed-while-recording").or_else(|| finding(report, "missing-physics"))
+}
+
+/// Why there is a limit of the degrees of freedom: with `Solution::TESTABLE` = 0 it counts what would be named without.
+#[test]
+#[ignore = "study: 360 simulated robots, three minutes"]
+fn study_of_what_is_named_in_clean_recordings_of_one_marker() {
+    const ROBOTS: u64 = 60;
+    let named_in = |postures: usize| {
+        let of = |seed: &u64| report(&recorded(Seen::Marker, postures, *seed, 0.0));
+        let count = (1..=ROBOTS)
+            .filter(|seed| named(&of(seed)).is_some())
+            .count();
+        println!("{postures} postures: something is named in {count} of {ROBOTS}");
+        count
+    };
+    let counts: Vec<usize> = (8..=13).map(named_in).collect();
+    // All tests together are false in less than 1 % of clean recordings: 5 of 60 are in one of 2500 studies.
+    assert!(counts.iter().all(|count| *count < 5), "{counts:?}");
+}
+
 #[test]
 fn a_fit_that_leaves_nothing_to_test_says_so_and_names_nothing() {
     for (postures, seed) in [8, 9, 10]
@@ -109,13 +132,11 @@ fn a_fit_that_leaves_nothing_to_test_says_so_and_names_nothing() {
         let said = finding(&report, "not-tested").expect("too few rows");
         let left = said["facts"]["freedom"].as_u64().expect("a count");
         assert!(left < 12, "{said:#}");
-        for id in ["changed-while-recording", "missing-physics"] {
-            let found = finding(&report, id);
-            assert!(
-                found.is_none(),
-                "{postures} postures, seed {seed}: {found:#?}"
-            );
-        }
+        let found = named(&report);
+        assert!(
+            found.is_none(),
+            "{postures} postures, seed {seed}: {found:#?}"
+        );
         assert_eq!(report["tested_effects"].as_array().map(Vec::len), Some(0));
     }
     let enough = report(&recorded(Seen::Marker, 15, 1, 0.0));
@@ -143,7 +164,7 @@ fn a_lone_marker_that_slips_has_a_size_and_no_angle() {
 
 /// Ten times the noise, in a recording of twelve postures: the change is named, or its scatter is.
 #[test]
-fn a_measured_body_that_was_bumped_is_not_accepted_without_a_word() {
+fn a_measured_body_that_was_bumped_is_not_accepted_without_a_warning() {
     for seed in 1..=6 {
         let report = report(&bumped(Seen::Pose, 12, seed, 2.0));
         let reasons = report["reason_ids"].as_array().expect("a list");

@@ -16,7 +16,7 @@ super::topic! {
     /// Too few rows for the tests of the fit.
     NOT_TESTED = "not-tested" {
         "": Warning,
-            "The fit leaves {freedom} degrees of freedom, and {needed} are needed to test the residuals: nothing is known of missing effects, and of what moved while the data were recorded.",
+            "The fit leaves {freedom} degrees of freedom; testing the residuals needs {needed}. Missing effects, and changes while the data were recorded, cannot be detected.",
             "Record more postures, or markers on more links.";
     }
     /// Something moved while the data were recorded.

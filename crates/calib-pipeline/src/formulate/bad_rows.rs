@@ -29,7 +29,8 @@ use crate::prepare::tracks::BodyTrack;
 
 /// What (1) may leave of a row's squared error: by chance a direction of six takes that much in 1 of 150 rows.
 const LEFT: f64 = 0.2;
-/// An error of one joint that leaves less of a row than (1), by so many squared units of what is usual, is what happened: a wrong reading, and no motion.
+/// An error of one joint that leaves less of a row than (1), by so many squared units of what is usual, is the better explanation: both have one
+/// parameter, and by chance a parameter explains so many in one row of 370.
 const BETTER: f64 = 9.0;
 /// Largest part of the way to a neighbor: beyond it the row would belong to the other posture.
 const LARGEST_FRACTION: f64 = 0.5;
