@@ -106,7 +106,7 @@ fn named(report: &Value) -> Option<&Value> {
 
 /// Why there is a limit of the degrees of freedom: with `Solution::TESTABLE` = 0 it counts what would be named without.
 #[test]
-#[ignore = "study: 360 simulated robots, three minutes"]
+#[ignore = "study: 360 simulated robots, a minute"]
 fn study_of_what_is_named_in_clean_recordings_of_one_marker() {
     const ROBOTS: u64 = 60;
     let named_in = |postures: usize| {

@@ -8,8 +8,10 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
-/// Sweeps after which Jacobi has converged for every matrix met (typically 6–10); a bound, not a tuning.
-const MAX_SWEEPS: usize = 60;
+mod jacobi;
+
+pub use jacobi::dot;
+use jacobi::{cyclic_jacobi, one_sided_jacobi};
 
 /// Thin singular value decomposition `A = U diag(s) Vᵀ`, singular values descending.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,6 +21,15 @@ pub struct Svd {
     /// k singular values, descending, ≥ 0.
     pub s: DVector<f64>,
     /// n × k, orthonormal columns.
+    pub v: DMatrix<f64>,
+}
+
+/// The half of a singular value decomposition `A = U diag(s) Vᵀ` that says what rows of A see of each direction.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RightSingular {
+    /// n singular values, descending, ≥ 0.
+    pub s: DVector<f64>,
+    /// n × n, orthonormal columns in the order of `s`; those of no singular value complete the basis.
     pub v: DMatrix<f64>,
 }
 
@@ -103,12 +114,57 @@ pub fn svd(a: &DMatrix<f64>) -> Svd {
     };
     let mut v = DMatrix::identity(n, n);
     let mut s = DVector::zeros(n);
-    one_sided_jacobi(work.as_mut_slice(), v.as_mut_slice(), s.as_mut_slice(), n);
+    one_sided_jacobi(
+        work.as_mut_slice(),
+        Some(v.as_mut_slice()),
+        s.as_mut_slice(),
+        n,
+    );
     let u = match q {
         Some(q) => q * work,
         None => work,
     };
     Svd { u, s, v }
+}
+
+/// Singular values and right singular vectors of any real matrix with finite entries.
+///
+/// Householder QR with column pivoting, `A P = Q R`, then one-sided Jacobi on the columns of `P Rᵀ = V diag(s) Uᵀ`: they become
+/// `V diag(s)` in a few sweeps, for R is graded, and nothing is accumulated (Drmač & Veselić 2008). Singular values that are rounding of the
+/// largest, at most n ε of it, are 0.
+#[must_use]
+pub fn right_singular(a: &DMatrix<f64>) -> RightSingular {
+    let n = a.ncols();
+    if n == 0 {
+        return RightSingular {
+            s: DVector::zeros(0),
+            v: DMatrix::zeros(0, 0),
+        };
+    }
+    // Squares of very small numbers are 0, those of very large ones infinite.
+    let size = a.amax();
+    let scale = if size > 0.0 && size.is_finite() {
+        size
+    } else {
+        1.0
+    };
+    let rows = row_factor(&(a / scale), f64::EPSILON * (n as f64).sqrt());
+    let mut v = DMatrix::zeros(n, n);
+    v.columns_mut(0, rows.nrows()).tr_copy_from(&rows);
+    let mut s = DVector::zeros(n);
+    one_sided_jacobi(v.as_mut_slice(), None, s.as_mut_slice(), n);
+    RightSingular { s: s * scale, v }
+}
+
+/// Eigen decomposition of a positive semidefinite matrix; what rounding leaves negative counts as 0.
+#[must_use]
+pub fn semidefinite_eigen(a: &DMatrix<f64>) -> SymmetricEigen {
+    let RightSingular { s, v } = right_singular(&square_root(a).transpose());
+    let n = s.len();
+    SymmetricEigen {
+        values: DVector::from_fn(n, |i, _| s[n - 1 - i] * s[n - 1 - i]),
+        vectors: DMatrix::from_fn(n, n, |r, c| v[(r, n - 1 - c)]),
+    }
 }
 
 /// Singular values only, descending; as accurate as [`svd`], without the m × n factor.
@@ -119,9 +175,8 @@ pub fn singular_values(a: &DMatrix<f64>) -> DVector<f64> {
         return singular_values(&a.transpose());
     }
     let mut r = if m > n { a.clone().qr().r() } else { a.clone() };
-    let mut v = DMatrix::identity(n, n);
     let mut s = DVector::zeros(n);
-    one_sided_jacobi(r.as_mut_slice(), v.as_mut_slice(), s.as_mut_slice(), n);
+    one_sided_jacobi(r.as_mut_slice(), None, s.as_mut_slice(), n);
     s
 }
 
@@ -131,7 +186,12 @@ pub fn svd_small<const N: usize>(a: &SMatrix<f64, N, N>) -> SvdSmall<N> {
     let mut u = *a;
     let mut v = SMatrix::<f64, N, N>::identity();
     let mut s = SVector::<f64, N>::zeros();
-    one_sided_jacobi(u.as_mut_slice(), v.as_mut_slice(), s.as_mut_slice(), N);
+    one_sided_jacobi(
+        u.as_mut_slice(),
+        Some(v.as_mut_slice()),
+        s.as_mut_slice(),
+        N,
+    );
     SvdSmall { u, s, v }
 }
 
@@ -248,6 +308,36 @@ pub fn row_factor(a: &DMatrix<f64>, relative_tolerance: f64) -> DMatrix<f64> {
     work.rows(0, rank).into_owned()
 }
 
+/// H with `HHᵀ = A` of a positive semidefinite A (n × n), as many columns as A has directions above rounding: Cholesky with the largest
+/// diagonal entry first. What rounding leaves negative counts as nothing.
+#[must_use]
+pub fn square_root(a: &DMatrix<f64>) -> DMatrix<f64> {
+    let n = a.nrows();
+    let mut left: Vec<f64> = a.diagonal().iter().copied().collect();
+    let nothing = left.iter().copied().fold(0.0, f64::max) * f64::EPSILON * n as f64;
+    let mut h = DMatrix::zeros(n, n);
+    let mut rank = 0;
+    while rank < n {
+        let largest = (0..n).fold(0, |best, i| if left[i] > left[best] { i } else { best });
+        if !(left[largest] > nothing) {
+            break;
+        }
+        // h = (A e_p − H Hᵀe_p) / √(A_pp − |Hᵀe_p|²)
+        let (done, mut rest) = h.columns_range_pair_mut(0..rank, rank..n);
+        let mut column = rest.column_mut(0);
+        column.copy_from(&a.column(largest));
+        column.gemv(-1.0, &done, &done.row(largest).transpose(), 1.0);
+        let root = left[largest].sqrt();
+        column /= root;
+        for (left, h) in left.iter_mut().zip(column.iter()) {
+            *left -= h * h;
+        }
+        left[largest] = 0.0;
+        rank += 1;
+    }
+    h.columns(0, rank).into_owned()
+}
+
 /// Number of singular values above `relative_tolerance` times the largest.
 #[must_use]
 pub fn rank(singular_values: &DVector<f64>, relative_tolerance: f64) -> usize {
@@ -276,213 +366,5 @@ pub fn solve_least_squares(
         x: v * y,
         rank,
         singular_values: s,
-    }
-}
-
-/// One-sided Jacobi (Hestenes) on an n × n column-major matrix `a`: on return `a` holds U, `v` V.
-fn one_sided_jacobi(a: &mut [f64], v: &mut [f64], s: &mut [f64], n: usize) {
-    // Scale to avoid overflow and underflow of the squared norms.
-    let scale = a.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-    if scale == 0.0 || !scale.is_finite() {
-        complete_basis(a, n, 0);
-        s.fill(if scale == 0.0 { 0.0 } else { f64::NAN });
-        return;
-    }
-    a.iter_mut().for_each(|x| *x /= scale);
-    let threshold = f64::EPSILON;
-    for _ in 0..MAX_SWEEPS {
-        // Squared norms of the columns: kept up to date within a sweep, and new with each.
-        for j in 0..n {
-            let column = &a[j * n..(j + 1) * n];
-            s[j] = dot(column, column);
-        }
-        let mut rotated = false;
-        for p in 0..n {
-            for q in p + 1..n {
-                let (x, y) = pair(a, p, q, n);
-                let gamma = dot(x, y);
-                let product = s[p] * s[q];
-                // Underflowing columns are zero columns.
-                if gamma == 0.0 || gamma.abs() <= threshold * product.sqrt() || product == 0.0 {
-                    continue;
-                }
-                rotated = true;
-                let (t, c) = rotation((s[q] - s[p]) / (2.0 * gamma));
-                rotate(x, y, c, c * t);
-                (s[p], s[q]) = match 16.0 * t.abs() * gamma.abs() < s[p].min(s[q]) {
-                    true => (s[p] - t * gamma, s[q] + t * gamma),
-                    // What is left of a column after most of it went has too few digits as a difference.
-                    false => (dot(x, x), dot(y, y)),
-                };
-                let (x, y) = pair(v, p, q, n);
-                rotate(x, y, c, c * t);
-            }
-        }
-        if !rotated {
-            break;
-        }
-    }
-    for j in 0..n {
-        s[j] = (0..n)
-            .map(|k| a[j * n + k] * a[j * n + k])
-            .sum::<f64>()
-            .sqrt();
-    }
-    sort_descending(a, v, s, n);
-    let smallest_meaningful = s[0] * f64::EPSILON * n as f64;
-    let mut independent = n;
-    for j in 0..n {
-        if s[j] <= smallest_meaningful {
-            independent = j;
-            break;
-        }
-        for k in 0..n {
-            a[j * n + k] /= s[j];
-        }
-    }
-    complete_basis(a, n, independent);
-    s.iter_mut().for_each(|x| *x *= scale);
-}
-
-/// Columns `p < q` of an n × n column-major matrix.
-#[inline]
-fn pair(a: &mut [f64], p: usize, q: usize, n: usize) -> (&mut [f64], &mut [f64]) {
-    let (before, from_q) = a.split_at_mut(q * n);
-    (&mut before[p * n..(p + 1) * n], &mut from_q[..n])
-}
-
-/// `x'y` in four sums that run beside each other: one sum would wait for each of its additions.
-#[inline]
-fn dot(x: &[f64], y: &[f64]) -> f64 {
-    let (fours_x, rest_x) = x.as_chunks::<4>();
-    let (fours_y, rest_y) = y.as_chunks::<4>();
-    let mut sums = [0.0; 4];
-    for (x, y) in fours_x.iter().zip(fours_y) {
-        for i in 0..4 {
-            sums[i] += x[i] * y[i];
-        }
-    }
-    let rest: f64 = rest_x.iter().zip(rest_y).map(|(x, y)| x * y).sum();
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
-}
-
-/// Tangent and cosine of the rotation that makes two columns orthogonal, the smaller of the two angles, from the cotangent of twice the angle.
-///
-/// Square roots only, which every machine rounds alike.
-#[inline]
-fn rotation(cotangent: f64) -> (f64, f64) {
-    let size = cotangent.abs();
-    // Above 1e8 the root is `size` to the last digit, and its square might overflow.
-    let root = if size < 1e8 {
-        (size * size + 1.0).sqrt()
-    } else {
-        size
-    };
-    let t = cotangent.signum() / (size + root);
-    (t, 1.0 / (t * t + 1.0).sqrt())
-}
-
-/// Columns x and y ← (c x − s y, s x + c y).
-#[inline]
-fn rotate(x: &mut [f64], y: &mut [f64], c: f64, s: f64) {
-    for (x, y) in x.iter_mut().zip(y) {
-        (*x, *y) = (c * *x - s * *y, s * *x + c * *y);
-    }
-}
-
-fn sort_descending(a: &mut [f64], v: &mut [f64], s: &mut [f64], n: usize) {
-    for i in 0..n {
-        let largest = (i..n).fold(i, |best, j| if s[j] > s[best] { j } else { best });
-        if largest != i {
-            s.swap(i, largest);
-            for k in 0..n {
-                a.swap(i * n + k, largest * n + k);
-                v.swap(i * n + k, largest * n + k);
-            }
-        }
-    }
-}
-
-/// Replaces columns `from..n` of `a` by unit vectors orthogonal to all others (Gram–Schmidt, twice).
-fn complete_basis(a: &mut [f64], n: usize, from: usize) {
-    for j in from..n {
-        let mut best = (0.0, 0);
-        for axis in 0..n {
-            // Squared norm of e_axis outside the span of the columns before j.
-            let inside: f64 = (0..j).map(|c| a[c * n + axis] * a[c * n + axis]).sum();
-            if 1.0 - inside > best.0 {
-                best = (1.0 - inside, axis);
-            }
-        }
-        for k in 0..n {
-            a[j * n + k] = if k == best.1 { 1.0 } else { 0.0 };
-        }
-        for _ in 0..2 {
-            for c in 0..j {
-                let dot: f64 = (0..n).map(|k| a[c * n + k] * a[j * n + k]).sum();
-                for k in 0..n {
-                    a[j * n + k] -= dot * a[c * n + k];
-                }
-            }
-            let norm = (0..n)
-                .map(|k| a[j * n + k] * a[j * n + k])
-                .sum::<f64>()
-                .sqrt();
-            for k in 0..n {
-                a[j * n + k] /= norm;
-            }
-        }
-    }
-}
-
-/// Cyclic Jacobi on a symmetric column-major matrix; eigenvalues ascending into `values`.
-fn cyclic_jacobi(a: &mut [f64], v: &mut [f64], values: &mut [f64], n: usize) {
-    // The lower triangle is authoritative.
-    for j in 0..n {
-        for i in 0..j {
-            a[j * n + i] = a[i * n + j];
-        }
-    }
-    for _ in 0..MAX_SWEEPS {
-        let mut rotated = false;
-        for p in 0..n {
-            for q in p + 1..n {
-                let off = a[p * n + q];
-                let (app, aqq) = (a[p * n + p], a[q * n + q]);
-                // Relative to both diagonal entries: keeps small eigenvalues of graded matrices.
-                if off == 0.0 || off.abs() <= f64::EPSILON * 0.5 * (app * aqq).abs().sqrt() {
-                    continue;
-                }
-                if off.abs() < f64::MIN_POSITIVE / f64::EPSILON {
-                    continue;
-                }
-                rotated = true;
-                let (t, c) = rotation((aqq - app) / (2.0 * off));
-                let (x, y) = pair(a, p, q, n);
-                rotate(x, y, c, c * t);
-                // The rows are the columns of a symmetric matrix, but for the four entries where both meet.
-                (x[p], x[q], y[p], y[q]) = (app - t * off, 0.0, 0.0, aqq + t * off);
-                for k in 0..n {
-                    (a[k * n + p], a[k * n + q]) = (a[p * n + k], a[q * n + k]);
-                }
-                let (x, y) = pair(v, p, q, n);
-                rotate(x, y, c, c * t);
-            }
-        }
-        if !rotated {
-            break;
-        }
-    }
-    for i in 0..n {
-        values[i] = a[i * n + i];
-    }
-    for i in 0..n {
-        let smallest = (i..n).fold(i, |best, j| if values[j] < values[best] { j } else { best });
-        if smallest != i {
-            values.swap(i, smallest);
-            for k in 0..n {
-                v.swap(i * n + k, smallest * n + k);
-            }
-        }
     }
 }

@@ -1,7 +1,8 @@
 //! Every decomposition rebuilds its input, near-singular and repeated spectra included.
 
 use calib_geometry::decompose::{
-    pencil_eigen, singular_values, solve_least_squares, svd, svd_small, symmetric_eigen,
+    pencil_eigen, right_singular, semidefinite_eigen, singular_values, solve_least_squares,
+    square_root, svd, svd_small, symmetric_eigen,
 };
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix5};
 use proptest::prelude::*;
@@ -29,6 +30,31 @@ fn assert_svd(a: &DMatrix<f64>) {
     );
     assert!(d.s.as_slice().windows(2).all(|w| w[0] >= w[1]) && d.s[k - 1] >= 0.0);
     assert!((singular_values(a) - &d.s).amax() <= TOLERANCE * scale * 20.0);
+    assert_right(a, &d.s, scale);
+}
+
+/// The half of it on the right, and the two of AᵀA.
+fn assert_right(a: &DMatrix<f64>, s: &DVector<f64>, scale: f64) {
+    let n = a.ncols();
+    let unit = DMatrix::identity(n, n);
+    let right = right_singular(a);
+    assert!((right.s.rows(0, s.len()) - s).amax() <= TOLERANCE * scale * 20.0);
+    assert!((right.v.tr_mul(&right.v) - &unit).amax() < TOLERANCE * 20.0);
+    // The squares of tiny numbers are 0.
+    let along = (a / scale) * &right.v;
+    for i in 0..n {
+        assert!((along.column(i).norm() - right.s[i] / scale).abs() <= TOLERANCE * 20.0);
+    }
+    let square = a.tr_mul(a);
+    let rounding = TOLERANCE * square.amax() * 20.0;
+    let root = square_root(&square);
+    assert!((&root * root.transpose() - &square).amax() <= rounding);
+    let eigen = semidefinite_eigen(&square);
+    assert!((eigen.vectors.tr_mul(&eigen.vectors) - unit).amax() < TOLERANCE * 20.0);
+    assert!(eigen.values.as_slice().windows(2).all(|w| w[0] <= w[1]) && eigen.values[0] >= 0.0);
+    let rebuilt =
+        &eigen.vectors * DMatrix::from_diagonal(&eigen.values) * eigen.vectors.transpose();
+    assert!((rebuilt - square).amax() <= rounding);
 }
 
 fn matrix(m: usize, n: usize) -> impl Strategy<Value = DMatrix<f64>> {
@@ -125,4 +151,12 @@ fn small_singular_values_keep_relative_accuracy() {
     let q = DMatrix::from_row_slice(3, 3, &[2.0, -1.0, 2.0, 2.0, 2.0, -1.0, -1.0, 2.0, 2.0]) / 3.0;
     let s = svd(&(q * scale)).s;
     assert!((s[2] / 1e-20 - 1.0).abs() < 1e-9, "{}", s[2]);
+}
+
+#[test]
+fn a_matrix_of_no_columns_has_no_directions() {
+    let nothing = right_singular(&DMatrix::zeros(3, 0));
+    assert_eq!((nothing.s.len(), nothing.v.shape()), (0, (0, 0)));
+    assert_eq!(square_root(&DMatrix::zeros(0, 0)).shape(), (0, 0));
+    assert_eq!(square_root(&DMatrix::zeros(2, 2)).shape(), (2, 0));
 }

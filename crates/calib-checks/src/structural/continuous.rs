@@ -15,6 +15,7 @@
 
 use std::collections::BTreeSet;
 
+use nalgebra::DMatrix;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::Options;
@@ -181,8 +182,9 @@ fn demanded(data: &Data, screened: &[SampleIndex], options: &Options) -> Option<
     if statistic < threshold {
         return None;
     }
-    let first = model.registration + 6 * model.geometry.len() + which;
-    let moved = projected(&plain.gram, model.registration, first, 1)?[(0, 0)].max(0.0);
+    let cross = plain.cross.view((0, which), (model.registration, 1));
+    let own = DMatrix::from_element(1, 1, plain.own[which]);
+    let moved = projected(&plain.gram, cross.into_owned(), own)?[(0, 0)].max(0.0);
     let effect = factor.abs() * (3.0 * moved / plain.observations).sqrt();
     if effect < options.least_effect {
         return None;
@@ -217,15 +219,13 @@ fn tests(data: &Data) -> Vec<Test> {
 /// (test, T, k̂, h) for every test.
 fn score_tests(model: &Model<'_>, sums: &Sums, map: &Map) -> Vec<(usize, f64, f64, f64)> {
     let p = model.registration + 6 * model.geometry.len();
-    let last = sums.gram.ncols() - 1;
-    let count = model.tests.len();
-    let cross = sums.gram.view((0, p), (p, count)).into_owned();
+    let cross = sums.cross.rows(0, p).into_owned();
     let solved = map.factor.solve(&cross);
-    (0..count)
+    (0..model.tests.len())
         .map(|t| {
-            let own = sums.gram[(p + t, p + t)];
+            let own = sums.own[t];
             let h = own - cross.column(t).dot(&solved.column(t));
-            let g = sums.gram[(p + t, last)] + cross.column(t).dot(&map.x);
+            let g = sums.cross[(p, t)] + cross.column(t).dot(&map.x);
             // A column that the geometry explains altogether tests nothing.
             if h <= 1e-9 * own || own <= 0.0 {
                 return (t, 0.0, 0.0, f64::INFINITY);

@@ -22,7 +22,9 @@ pub(crate) fn expected(
     let model = Model::new(data, &[], screened);
     let sums = model.sums(0.0);
     let (m, g) = (model.registration, 6 * model.geometry.len());
-    let k = projected(&sums.gram, m, m, g)?;
+    let cross = sums.gram.view((0, m), (m, g)).into_owned();
+    let own = sums.gram.view((m, m), (g, g)).into_owned();
+    let k = projected(&sums.gram, cross, own)?;
     let c = prior_precision(&model, options);
     // C^½ K C^½
     let scaled = DMatrix::from_fn(g, g, |a, b| k[(a, b)] / (c[a] * c[b]).sqrt());

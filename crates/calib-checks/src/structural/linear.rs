@@ -34,12 +34,111 @@ pub(crate) struct Model<'a> {
     pub point_column: Vec<usize>,
 }
 
+/// Bodies whose rows err together, for joints that move one move the others; V is block-diagonal over the groups.
+struct Group {
+    bodies: Vec<usize>,
+    channels: Vec<usize>,
+    /// Column of the group → column of the model, ascending.
+    columns: Vec<usize>,
+    /// Column of the model → column of the group; their number where it has none.
+    place: Vec<usize>,
+}
+
+/// The groups of a model, by their first body.
+fn groups(model: &Model<'_>) -> Vec<Group> {
+    let data = model.scan.data;
+    let joints = data.chain.joints();
+    let moved_by = |body: usize| -> BTreeSet<usize> {
+        let path = data.chain.path(data.bodies[body].link);
+        let laws = path.into_iter().flat_map(|j| &joints[j.0].law);
+        laws.map(|(source, _)| source.0).collect()
+    };
+    let mut groups: Vec<(BTreeSet<usize>, Vec<usize>)> = Vec::new();
+    for body in 0..data.bodies.len() {
+        let (mut sources, mut bodies) = (moved_by(body), vec![body]);
+        let (together, apart): (Vec<_>, Vec<_>) =
+            groups.into_iter().partition(|g| !g.0.is_disjoint(&sources));
+        for (more, others) in together {
+            sources.extend(more);
+            bodies.extend(others);
+        }
+        bodies.sort_unstable();
+        groups = apart;
+        groups.push((sources, bodies));
+    }
+    groups.sort_by(|a, b| a.1.cmp(&b.1));
+    groups
+        .into_iter()
+        .map(|(_, bodies)| group_of(model, bodies))
+        .collect()
+}
+
+fn group_of(model: &Model<'_>, bodies: Vec<usize>) -> Group {
+    let (data, count) = (model.scan.data, model.scan.channels.len());
+    let of_group = |k: &usize| bodies.contains(&model.scan.channels[*k].body);
+    let channels: Vec<usize> = (0..count).filter(of_group).collect();
+    // Registration, then the points and the joints of the group.
+    let mut columns: BTreeSet<usize> = (0..6).collect();
+    for (r, &k) in (0..model.scan.recordings).flat_map(|r| channels.iter().map(move |k| (r, k))) {
+        let first = model.point_column[r * count + k];
+        columns.extend(first..first + 3);
+    }
+    for joint in bodies
+        .iter()
+        .flat_map(|&b| data.chain.path(data.bodies[b].link))
+    {
+        if let Some(g) = model.geometry.iter().position(|j| *j == joint.0) {
+            let first = model.registration + 6 * g;
+            columns.extend(first..first + 6);
+        }
+    }
+    let columns: Vec<usize> = columns.into_iter().collect();
+    let mut place = vec![columns.len(); model.columns()];
+    for (own, &column) in columns.iter().enumerate() {
+        place[column] = own;
+    }
+    Group {
+        bodies,
+        channels,
+        columns,
+        place,
+    }
+}
+
 /// Sums of a whitened model.
 pub(crate) struct Sums {
-    /// (columns + 1)², the residual last; of two tests there is no product.
+    /// Products of the columns of registration and geometry and the residual, which is last.
     pub gram: DMatrix<f64>,
+    /// Those of the same with the columns of the tests.
+    pub cross: DMatrix<f64>,
+    /// Square of every test's column.
+    pub own: DVector<f64>,
     pub log_det: f64,
     pub observations: f64,
+}
+
+impl Sums {
+    /// Adds those of a group with these columns.
+    fn add(&mut self, own: &Self, columns: &[usize]) {
+        let residual = [self.gram.ncols() - 1];
+        let places: Vec<usize> = columns.iter().chain(&residual).copied().collect();
+        for (own, &column) in own.gram.column_iter().zip(&places) {
+            let mut to = self.gram.column_mut(column);
+            places
+                .iter()
+                .zip(own.iter())
+                .for_each(|(&row, x)| to[row] += x);
+        }
+        for (mut to, own) in self.cross.column_iter_mut().zip(own.cross.column_iter()) {
+            places
+                .iter()
+                .zip(own.iter())
+                .for_each(|(&row, x)| to[row] += x);
+        }
+        self.own += &own.own;
+        self.log_det += own.log_det;
+        self.observations += own.observations;
+    }
 }
 
 impl<'a> Model<'a> {
@@ -90,24 +189,46 @@ impl<'a> Model<'a> {
 
     /// [`sums`](Self::sums) for several ratios: the rows are the same.
     pub(crate) fn sums_of<const N: usize>(&self, lambdas: [f64; N]) -> [Sums; N] {
-        let width = self.columns() + 1;
+        let (width, tests) = (self.columns() + 1, self.tests.len());
+        let mut out = lambdas.map(|_| Sums {
+            gram: DMatrix::zeros(width, width),
+            cross: DMatrix::zeros(width, tests),
+            own: DVector::zeros(tests),
+            log_det: 0.0,
+            observations: 0.0,
+        });
+        for group in groups(self) {
+            let own = self.sums_of_group(&group, lambdas);
+            for (all, own) in out.iter_mut().zip(own) {
+                all.add(&own, &group.columns);
+            }
+        }
+        out
+    }
+
+    /// Those over the rows of a group, over its columns.
+    fn sums_of_group<const N: usize>(&self, group: &Group, lambdas: [f64; N]) -> [Sums; N] {
+        let width = group.columns.len() + 1;
         let mut white = Tall::new(width);
         let mut out = lambdas.map(|lambda| {
             let tested = TestedSums::new(lambda, width, self.tests);
             (Whitened::new(lambda, width), tested)
         });
         let mut observations = 0.0;
-        let links: Vec<LinkIndex> = self.scan.data.bodies.iter().map(|b| b.link).collect();
-        let mut walk = Walk::new(&self.scan.data.chain, &links);
-        for i in 0..self.scan.data.readings.len() {
-            let seen: Vec<usize> = (0..self.scan.channels.len())
-                .filter(|k| self.scan.weights[i * self.scan.channels.len() + k] > 0.0)
+        let data = self.scan.data;
+        let links: Vec<LinkIndex> = group.bodies.iter().map(|&b| data.bodies[b].link).collect();
+        let mut walk = Walk::new(&data.chain, &links);
+        for i in 0..data.readings.len() {
+            let of_row = i * self.scan.channels.len();
+            let kept = group.channels.iter().copied();
+            let seen: Vec<usize> = kept
+                .filter(|k| self.scan.weights[of_row + k] > 0.0)
                 .collect();
             if seen.is_empty() {
                 continue;
             }
-            walk.go(&self.scan.data.chain, self.scan.readings(i));
-            let (mut block, mut by_reading) = self.row(i, &seen, &walk);
+            walk.go(&data.chain, self.scan.readings(i));
+            let (mut block, mut by_reading) = self.row(i, &seen, group, &walk);
             for (s, &k) in seen.iter().enumerate() {
                 block.rows_mut(3 * s, 3).scale_mut(self.share(k));
                 by_reading
@@ -116,7 +237,7 @@ impl<'a> Model<'a> {
             }
             let measured = 3.0 * seen.iter().map(|&k| self.share(k).powi(2)).sum::<f64>();
             observations += measured;
-            let noise = JointNoise::of(&self.scan.data.chain, &block, by_reading);
+            let noise = JointNoise::of(&data.chain, &block, by_reading);
             if noise.is_narrow() {
                 white.push(&block);
                 out.iter_mut().for_each(|w| w.0.subtract(&noise));
@@ -125,28 +246,31 @@ impl<'a> Model<'a> {
             }
             let instant = Instant {
                 readings: self.scan.readings(i),
-                recording: self.scan.data.recording[i],
-                rates: self.scan.data.rates.get(i).and_then(Option::as_deref),
+                recording: data.recording[i],
+                rates: data.rates.get(i).and_then(Option::as_deref),
             };
             out.iter_mut().for_each(|w| w.1.add(&noise, &instant));
         }
         let white = white.gram();
         out.map(|(whitened, tested)| Sums {
-            gram: tested.beside(&(&white + whitened.added.gram() - whitened.subtracted.gram())),
+            gram: &white + whitened.added.gram() - whitened.subtracted.gram(),
+            cross: tested.cross,
+            own: tested.own,
             log_det: whitened.log_det,
             observations,
         })
     }
 
-    /// The rows of one instant: the columns of registration and geometry and the residual; and ∂p/∂reading for each reading.
+    /// The rows of one instant: the group's columns of registration and geometry and the residual; and ∂p/∂reading for each reading.
     fn row(
         &self,
         i: usize,
         seen: &[usize],
+        group: &Group,
         walk: &Walk,
     ) -> (DMatrix<f64>, Vec<(usize, DVector<f64>)>) {
         let data = self.scan.data;
-        let width = self.columns() + 1;
+        let width = group.columns.len() + 1;
         let mut block = DMatrix::zeros(3 * seen.len(), width);
         let sources = self.sources.iter();
         let mut by_reading: Vec<(usize, DVector<f64>)> = sources
@@ -160,7 +284,7 @@ impl<'a> Model<'a> {
             set(&mut block, at, 0, &(-y.cross_matrix()));
             set(&mut block, at, 3, &nalgebra::Matrix3::identity());
             let column = self.point_column[data.recording[i].0 * self.scan.channels.len() + k];
-            set(&mut block, at, column, &(-link.r));
+            set(&mut block, at, group.place[column], &(-link.r));
             for joint in data
                 .chain
                 .path(data.bodies[self.scan.channels[k].body].link)
@@ -169,8 +293,9 @@ impl<'a> Model<'a> {
                 if let Some(g) = self.geometry.iter().position(|j| *j == joint.0) {
                     // p changes by (R e_a) × (p − o) for a rotation of the joint's frame, by R e_a for a translation
                     let arm = (p - frame.t).cross_matrix();
-                    set(&mut block, at, self.registration + 6 * g, &(arm * frame.r));
-                    set(&mut block, at, self.registration + 6 * g + 3, &(-frame.r));
+                    let column = group.place[self.registration + 6 * g];
+                    set(&mut block, at, column, &(arm * frame.r));
+                    set(&mut block, at, column + 3, &(-frame.r));
                 }
                 let along = motion_column(data.chain.joints()[joint.0].motion, &frame, &p);
                 for (source, factor) in &data.chain.joints()[joint.0].law {
@@ -290,17 +415,19 @@ pub(crate) fn prior_precision(model: &Model<'_>, options: &Options) -> DVector<f
     })
 }
 
-/// The Gram matrix of some columns after the first `m` are projected out.
+/// The Gram matrix `own` of some columns after the first m of `gram` are projected out, whose products with them are `cross`, m × columns.
 pub(crate) fn projected(
     gram: &DMatrix<f64>,
-    m: usize,
-    first: usize,
-    count: usize,
+    cross: DMatrix<f64>,
+    own: DMatrix<f64>,
 ) -> Option<DMatrix<f64>> {
+    let m = cross.nrows();
     let mut n = gram.view((0, 0), (m, m)).into_owned();
     let ridge = RIDGE * n.diagonal().amax().max(f64::MIN_POSITIVE);
     (0..m).for_each(|a| n[(a, a)] += ridge);
-    let cross = gram.view((0, first), (m, count)).into_owned();
     let solved = Cholesky::new(n)?.solve(&cross);
-    Some(gram.view((first, first), (count, count)) - cross.transpose() * solved)
+    Some(own - cross.transpose() * solved)
 }
+
+#[cfg(test)]
+mod tests;

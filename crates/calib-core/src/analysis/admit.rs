@@ -198,8 +198,8 @@ pub(crate) fn left_out_squares(
     for sample in 0..model.problem.samples {
         let mut step = DVector::zeros(n);
         if let Some(s) = whitened(objective, values, sample, &mut work) {
-            let ac = &s.a * &c;
-            let left = DMatrix::identity(s.w.len(), s.w.len()) - &ac * s.a.transpose();
+            let (ac, taken) = s.a.between(&c);
+            let left = DMatrix::identity(s.w.len(), s.w.len()) - taken;
             let eigen = calib_geometry::decompose::symmetric_eigen(&left);
             if eigen.values[0] < LEVERAGE_LEFT {
                 continue;

@@ -125,7 +125,7 @@ impl Solution {
         work.cache.update(&self.model.problem, &self.values);
         self.each_numbered_sample(&candidates, samples, &mut work, |sample, s, alpha| {
             // Rows of Lᵀ with C = LLᵀ: bᵀCb is the square of Lᵀb.
-            let taken = &s.a * &half;
+            let taken = s.a.times(&half);
             for (scan, u) in scans.iter_mut().zip(alpha.column_iter()) {
                 let square = u.norm_squared();
                 if square > 0.0 {

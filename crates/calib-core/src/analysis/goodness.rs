@@ -245,12 +245,10 @@ impl Solution {
                 u[k] += own.dot(&s.w);
                 raw[k] += own.norm_squared();
             }
-            // The product of a transpose has no fast kernel.
-            let transposed = s.a.transpose();
-            b.gemm(1.0, &transposed, alpha, 1.0);
+            s.a.add_transposed_times(1.0, alpha, &mut b);
             if !looked_at.all {
-                h.gemm(1.0, &transposed, &s.a, 1.0);
-                g.gemv(1.0, &transposed, &s.w, 1.0);
+                s.a.add_gram(1.0, &mut h);
+                s.a.add_transposed_vector(&s.w, &mut g);
             }
         });
         // From the minimum of all samples to that of those looked at, U ← U + bᵀδ.
@@ -270,8 +268,8 @@ impl Solution {
         let mut clusters = vec![0.0; count];
         let mut chi2 = 0.0;
         self.each_sample(candidates, samples, &mut work, |s, alpha| {
-            let left = alpha - &s.a * &taken;
-            let moved = step.as_ref().map(|step| &s.w + &s.a * step);
+            let left = alpha - s.a.times(&taken);
+            let moved = step.as_ref().map(|step| &s.w + s.a.times_vector(step));
             let w = moved.as_ref().unwrap_or(&s.w);
             chi2 += w.norm_squared();
             for (k, own) in left.column_iter().enumerate() {

@@ -10,6 +10,7 @@
 //! strongest, and those are the ones that matter here.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -17,11 +18,13 @@ use calib_geometry::decompose;
 
 use crate::model::cache::State;
 use crate::model::layout::Model;
+use crate::model::parts::Part;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
 use crate::solve::chunks::{chunked, is_one_chunk};
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::rows::SampleRows;
+use crate::solve::whitened::lower_inverse;
 
 /// A direction whose singular value is below this fraction of the largest is a gauge: rounding
 /// leaves about 1e-14, the weakest physical effect seen on real robots about 1e-6.
@@ -131,38 +134,82 @@ pub struct Information {
     pub(crate) r: DMatrix<f64>,
 }
 
-/// The triangular factor of some samples, columns in units of `scale`.
+/// The triangular factor of a part's rows of some samples, columns in units of `scale`, those of the part.
 fn factor_of(
     objective: Objective,
     at: State,
     samples: Range<usize>,
     scale: &DVector<f64>,
-    rows: &mut SampleRows,
-) -> Option<StreamedQr> {
+    part: &Arc<Part>,
+) -> Option<DMatrix<f64>> {
     let Objective {
         model,
         weights,
         theta,
     } = objective;
-    let n = model.free();
+    let mut rows = SampleRows::of(model, part);
+    let n = rows.n;
     let mut qr = StreamedQr::new(n);
     let mut scaled = vec![0.0; n];
     for sample in samples {
-        if model.of_sample[sample].is_empty() {
+        rows.fill(model, at, weights, sample, Derivatives::All);
+        if rows.m == 0 {
             continue;
         }
-        rows.fill(model, at, weights, sample, Derivatives::All);
         rows.covariance(model, weights, theta);
         rows.factor()?;
         rows.whiten(true);
         for i in 0..rows.m {
             for c in 0..n {
-                scaled[c] = rows.j[i * n + c] * scale[c];
+                scaled[c] = rows.j[i * n + c] * scale[part.columns[c]];
             }
             qr.append(&scaled);
         }
     }
-    Some(qr)
+    Some(qr.finish())
+}
+
+/// R over all columns, from that of each part.
+fn joined(model: &Model, parts: impl Iterator<Item = DMatrix<f64>>) -> DMatrix<f64> {
+    let n = model.free();
+    let mut all = StreamedQr::new(n);
+    let mut row = vec![0.0; n];
+    for (part, factor) in model.parts.iter().zip(parts) {
+        if model.parts.len() == 1 && part.columns.len() == n {
+            return factor;
+        }
+        for own in factor.row_iter() {
+            row.fill(0.0);
+            for (x, &column) in own.iter().zip(&part.columns) {
+                row[column] = *x;
+            }
+            all.append(&row);
+        }
+    }
+    all.finish()
+}
+
+/// K with K Kᵀ = (RᵀR + P)⁻¹, from the triangular factor of [R; P^½]; `None` where some direction may be known by neither.
+fn posterior_root(r: &DMatrix<f64>, priors: &[(usize, f64)]) -> Option<DMatrix<f64>> {
+    /// Largest |R| |R⁻¹| of a factor that leaves no doubt: far from [`NULL_TOLERANCE`].
+    const CONDITION: f64 = 1e8;
+    let n = r.ncols();
+    let mut factor = StreamedQr::new(n);
+    for (i, row) in factor.r.chunks_exact_mut(n.max(1)).enumerate() {
+        row.iter_mut()
+            .zip(r.row(i).iter())
+            .for_each(|(to, x)| *to = *x);
+    }
+    let mut row = vec![0.0; n];
+    for &(c, weight) in priors {
+        row[c] = weight;
+        factor.append(&row);
+        row[c] = 0.0;
+    }
+    let factor = factor.finish();
+    // Column after column of F is row after row of Fᵀ; those of its inverse are the columns of F⁻¹.
+    let inverse = DMatrix::from_vec(n, n, lower_inverse(factor.as_slice(), n));
+    (factor.norm() * inverse.norm() < CONDITION).then_some(inverse)
 }
 
 impl Information {
@@ -185,23 +232,28 @@ impl Information {
             theta,
         };
         let at = State::new(&model.problem, &work.cache, values);
-        let of = |samples: Range<usize>| {
-            let mut rows = SampleRows::new(model);
-            factor_of(objective, at, samples, &scale, &mut rows)
+        let of = |samples: Range<usize>| -> Option<Vec<DMatrix<f64>>> {
+            let parts = model.parts.iter();
+            parts
+                .map(|part| factor_of(objective, at, samples.clone(), &scale, part))
+                .collect()
         };
         let count = model.problem.samples;
-        let qr = if is_one_chunk(count) {
-            of(0..count)?
+        let r = if is_one_chunk(count) {
+            joined(model, of(0..count)?.into_iter())
         } else {
-            let mut qr = StreamedQr::new(n);
-            chunked(count, of, |part| {
-                part.finish()
-                    .row_iter()
-                    .for_each(|row| qr.append(row.transpose().as_slice()));
+            let parts = model.parts.iter();
+            let mut sums: Vec<StreamedQr> = parts
+                .map(|part| StreamedQr::new(part.columns.len()))
+                .collect();
+            chunked(count, of, |chunk| {
+                for (sum, factor) in sums.iter_mut().zip(chunk) {
+                    let rows = factor.row_iter();
+                    rows.for_each(|row| sum.append(row.transpose().as_slice()));
+                }
             })?;
-            qr
+            joined(model, sums.into_iter().map(StreamedQr::finish))
         };
-        let r = qr.finish();
         if !r.iter().all(|x| x.is_finite()) {
             return None;
         }
@@ -210,7 +262,7 @@ impl Information {
 
     fn from_factor(model: &Model, scale: DVector<f64>, r: DMatrix<f64>) -> Self {
         let n = scale.len();
-        let svd = decompose::svd(&r);
+        let svd = decompose::right_singular(&r);
         let rank = decompose::rank(&svd.s, NULL_TOLERANCE);
         // [R; P^½]
         let priors: Vec<(usize, f64)> = model
@@ -222,23 +274,29 @@ impl Information {
                 Some((c, scale[c] / sigma))
             })
             .collect();
-        let mut augmented = DMatrix::zeros(n + priors.len(), n);
-        augmented.view_mut((0, 0), (n, n)).copy_from(&r);
-        for (i, &(c, weight)) in priors.iter().enumerate() {
-            augmented[(n + i, c)] = weight;
-        }
-        let posterior = if priors.is_empty() {
-            svd.clone()
-        } else {
-            decompose::svd(&augmented)
+        let (mut half, indeterminate) = match posterior_root(&r, &priors) {
+            Some(root) => (root, DMatrix::zeros(n, 0)),
+            None => {
+                let mut augmented = DMatrix::zeros(n + priors.len(), n);
+                augmented.view_mut((0, 0), (n, n)).copy_from(&r);
+                for (i, &(c, weight)) in priors.iter().enumerate() {
+                    augmented[(n + i, c)] = weight;
+                }
+                let posterior = if priors.is_empty() {
+                    svd.clone()
+                } else {
+                    decompose::right_singular(&augmented)
+                };
+                let known = decompose::rank(&posterior.s, NULL_TOLERANCE * 1e-3);
+                let known = if priors.is_empty() { rank } else { known };
+                let mut half = posterior.v.columns(0, known).into_owned();
+                for i in 0..known {
+                    half.column_mut(i).unscale_mut(posterior.s[i]);
+                }
+                (half, posterior.v.columns(known, n - known).into_owned())
+            }
         };
-        let known = decompose::rank(&posterior.s, NULL_TOLERANCE * 1e-3);
-        let known = if priors.is_empty() { rank } else { known };
         // C = S W d⁻² Wᵀ S
-        let mut half = posterior.v.columns(0, known).into_owned();
-        for i in 0..known {
-            half.column_mut(i).unscale_mut(posterior.s[i]);
-        }
         for c in 0..n {
             half.row_mut(c).scale_mut(scale[c]);
         }
@@ -249,7 +307,7 @@ impl Information {
             directions: svd.v,
             rank,
             covariance,
-            indeterminate: posterior.v.columns(known, n - known).into_owned(),
+            indeterminate,
             r,
         }
     }
@@ -320,3 +378,29 @@ impl Information {
 
 /// A component of a unit null vector under this is rounding.
 pub(crate) const INDETERMINATE: f64 = 1e-5;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Against the inverse itself; where priors leave a direction open there is none.
+    #[test]
+    fn the_posterior_root_is_one_of_the_inverse() {
+        let n = 7;
+        let mut r = DMatrix::from_fn(n, n, |i, k| ((i * 31 + k * 17) as f64).sin());
+        r.fill_lower_triangle(0.0, 1);
+        for i in 0..n - 1 {
+            r[(i, i)] += 3.0;
+        }
+        r[(6, 6)] = 0.0;
+        let priors = [(2, 0.5), (6, 2.0)];
+        let mut information = r.tr_mul(&r);
+        for (c, weight) in priors {
+            information[(c, c)] += weight * weight;
+        }
+        let root = posterior_root(&r, &priors).expect("every direction is known");
+        let inverse = information.try_inverse().expect("regular");
+        assert!((&root * root.transpose() - &inverse).amax() < 1e-10 * inverse.amax());
+        assert!(posterior_root(&r, &priors[..1]).is_none());
+    }
+}

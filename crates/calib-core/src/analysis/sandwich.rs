@@ -78,7 +78,7 @@ impl Solution {
                 continue;
             };
             let noise = whitened(other, &self.values, sample, &mut of_other)?;
-            let scores = rows.a.tr_mul(&(rows.l_inverse * noise.l));
+            let scores = rows.a.transposed_times(&(rows.l_inverse * noise.l));
             middle.gemm(factor, &scores, &scores.transpose(), 1.0);
         }
         Some(self.at_least(middle))
@@ -88,7 +88,7 @@ impl Solution {
     fn at_least(&self, middle: DMatrix<f64>) -> Self {
         let half = self.half_covariance();
         let inside = half.tr_mul(&(middle * &half));
-        let eigen = calib_geometry::decompose::symmetric_eigen(&inside);
+        let eigen = calib_geometry::decompose::semidefinite_eigen(&inside);
         let mut wider = half * eigen.vectors;
         for (k, value) in eigen.values.iter().enumerate() {
             wider.column_mut(k).scale_mut(value.max(1.0).sqrt());
@@ -187,8 +187,8 @@ fn adjusted_score(
     let s = whitened(objective, values, sample, work)?;
     let m = s.w.len();
     // I − Q = U diag(λ) Uᵀ
-    let ac = &s.a * c;
-    let eigen = (DMatrix::identity(m, m) - ac * s.a.transpose()).symmetric_eigen();
+    let (_, taken) = s.a.between(c);
+    let eigen = (DMatrix::identity(m, m) - taken).symmetric_eigen();
     // (I − Q)^(-½) w = U diag(λ^(-½)) Uᵀ w
     let mut coefficients = eigen.eigenvectors.tr_mul(&s.w);
     for k in 0..m {
@@ -200,5 +200,7 @@ fn adjusted_score(
         };
     }
     let adjusted = &eigen.eigenvectors * coefficients;
-    Some(s.a.tr_mul(&adjusted))
+    let mut score = DVector::zeros(c.nrows());
+    s.a.add_transposed_vector(&adjusted, &mut score);
+    Some(score)
 }

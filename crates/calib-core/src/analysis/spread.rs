@@ -112,10 +112,10 @@ impl Solution {
         let moved = &g * &half;
         let root = (points.len() as f64).sqrt();
         let sigma: Vec<f64> = (0..points.len())
-            .map(|m| moved.view((3 * m, 0), (3, n)).norm())
+            .map(|m| moved.rows(3 * m, 3).norm())
             .collect();
         let rms = moved.norm() / root;
-        let svd = decompose::svd(&moved);
+        let svd = decompose::right_singular(&moved);
         let directions: Vec<SpreadDirection> = svd
             .s
             .iter()
@@ -149,17 +149,14 @@ impl Solution {
         })
     }
 
-    /// A square root of C of equation (2) of [`Information`](crate::Information): C = H Hᵀ.
-    pub(crate) fn half_covariance(&self) -> DMatrix<f64> {
+    /// A square root of C of equation (2) of [`Information`](crate::Information): C = H Hᵀ, free parameters × directions that are known.
+    #[must_use]
+    pub fn half_covariance(&self) -> DMatrix<f64> {
         let scale = &self.information.scale;
         let n = scale.len();
         let covariance = &self.information.covariance;
         let scaled = DMatrix::from_fn(n, n, |i, j| covariance[(i, j)] / (scale[i] * scale[j]));
-        let eigen = decompose::symmetric_eigen(&scaled);
-        let mut half = eigen.vectors;
-        for (k, value) in eigen.values.iter().enumerate() {
-            half.column_mut(k).scale_mut(value.max(0.0).sqrt());
-        }
+        let mut half = decompose::square_root(&scaled);
         for (i, s) in scale.iter().enumerate() {
             half.row_mut(i).scale_mut(*s);
         }

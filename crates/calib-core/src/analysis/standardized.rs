@@ -87,6 +87,5 @@ impl Solution {
 
 /// (A C Aᵀ)_ii.
 fn leverages(s: &Whitened, c: &DMatrix<f64>) -> Vec<f64> {
-    let ac = &s.a * c;
-    (0..s.w.len()).map(|i| ac.row(i).dot(&s.a.row(i))).collect()
+    s.a.squares_with(c)
 }

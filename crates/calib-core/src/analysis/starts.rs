@@ -232,10 +232,9 @@ impl Free {
         let mut squares = 0.0;
         let candidates: Vec<Candidate> = pieces.iter().map(|p| p.candidate.clone()).collect();
         solution.each_sample(&candidates, &solution.used_samples(), &mut work, |s, d| {
-            let transposed = s.a.transpose();
-            h.gemm(1.0, &transposed, &s.a, 1.0);
-            g.gemv(1.0, &transposed, &s.w, 1.0);
-            ad.gemm(1.0, &transposed, d, 1.0);
+            s.a.add_gram(1.0, &mut h);
+            s.a.add_transposed_vector(&s.w, &mut g);
+            s.a.add_transposed_times(1.0, d, &mut ad);
             dd.gemm(1.0, &d.transpose(), d, 1.0);
             dw += d.tr_mul(&s.w);
             squares += s.w.norm_squared();

@@ -203,15 +203,16 @@ impl Solution {
             };
             rows += s.w.len();
             squares += s.w.norm_squared();
-            h.gemm_tr(1.0, &s.a, &s.a, 1.0);
-            g.gemv_tr(1.0, &s.a, &s.w, 1.0);
+            s.a.add_gram(1.0, &mut h);
+            s.a.add_transposed_vector(&s.w, &mut g);
         }
         if rows == 0 {
             return None;
         }
         // C = L Lᵀ;   gᵀ (C⁻¹ + H)⁻¹ g = (Lᵀg)ᵀ (1 + Lᵀ H L)⁻¹ (Lᵀg)
         let l = self.half_covariance();
-        let inner = DMatrix::identity(n, n) + l.transpose() * h * &l;
+        let known = l.ncols();
+        let inner = DMatrix::identity(known, known) + l.transpose() * h * &l;
         let along = l.tr_mul(&g);
         let explained = along.dot(&inner.cholesky()?.solve(&along));
         Some((squares - explained, rows))
@@ -275,7 +276,7 @@ pub(crate) fn predictions(
             continue;
         };
         let m = s.w.len();
-        let q = &s.a * &c * s.a.transpose();
+        let (_, q) = s.a.between(&c);
         let with_all = &s.l * (DMatrix::identity(m, m) + &q);
         let Some(predicted) = Predicted::new(q, &s.w, left_out) else {
             out.indispensable.push(sample);

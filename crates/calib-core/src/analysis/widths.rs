@@ -19,7 +19,7 @@
 use nalgebra::{Cholesky, DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use calib_geometry::decompose::{solve_least_squares, symmetric_eigen};
+use calib_geometry::decompose::{semidefinite_eigen, solve_least_squares};
 
 use crate::analysis::estimate::{Start, refit};
 use crate::analysis::information::Information;
@@ -235,7 +235,7 @@ impl Evidence {
         let scaled = DMatrix::from_fn(n, n, |i, j| {
             covariance[(used[i].1, used[j].1)] / (used[i].2 * used[j].2)
         });
-        let eigen = symmetric_eigen(&scaled);
+        let eigen = semidefinite_eigen(&scaled);
         let z = DVector::from_iterator(
             n,
             used.iter()

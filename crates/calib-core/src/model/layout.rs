@@ -1,6 +1,7 @@
 //! A checked problem, laid out for the solver: columns, compiled paths, observations by sample.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::Isometry3;
 
@@ -10,6 +11,7 @@ use crate::graph::ids::{EdgeId, FrameId, MeasurementId};
 use crate::graph::measurement::{Markers, Measurement, MeasurementKind};
 use crate::graph::problem::Problem;
 use crate::model::cache::{Trig, tabulate};
+use crate::model::parts::{Laid, Part};
 use crate::model::path::CompiledPath;
 use crate::model::values::{Slot, Values, coordinates};
 use crate::model::walk::{contract_unmoved, random_slots, walk};
@@ -35,10 +37,12 @@ pub struct Model {
     pub(crate) trig: Trig,
     /// Random effects of a sample.
     pub(crate) slots: Vec<Slot>,
+    /// All measurements.
+    pub(crate) whole: Arc<Part>,
+    /// Those that share random effects, apart from the others.
+    pub(crate) parts: Vec<Arc<Part>>,
     /// Residual rows over all observations.
     pub(crate) rows: usize,
-    /// Largest number of rows in one sample.
-    pub(crate) max_rows: usize,
     unmoved: Vec<EdgeId>,
     /// (measurement, sample, item) of observations whose path has no measurement at their sample.
     lost: Vec<(usize, usize, usize)>,
@@ -168,16 +172,20 @@ impl Model {
 
         let slots = random_slots(&problem, &walks);
         let start_values = Values(problem.parameters.iter().map(|p| p.start).collect());
-        let paths = walks
+        let paths: Vec<CompiledPath> = walks
             .iter()
             .map(|w| CompiledPath::new(&problem, &start_values, &column_of, &slots, w))
             .collect();
+        let laid = Laid {
+            problem: &problem,
+            column_of: &column_of,
+            paths: &paths,
+            of_measurement: &of_measurement,
+            sizes: (columns.len(), slots.len()),
+        };
+        let whole = Arc::new(laid.whole());
+        let parts = laid.parts().into_iter().map(Arc::new).collect();
         let rows = observations.iter().map(|o| o.rows).sum();
-        let max_rows = of_sample
-            .iter()
-            .map(|r| observations[r.clone()].iter().map(|o| o.rows).sum())
-            .max()
-            .unwrap_or(0);
         Ok(Self {
             columns,
             column_of,
@@ -188,8 +196,9 @@ impl Model {
             alike: problem.measurements.iter().map(is_alike).collect(),
             trig: tabulate(&problem),
             slots,
+            whole,
+            parts,
             rows,
-            max_rows,
             unmoved,
             lost: lost_items,
             problem,

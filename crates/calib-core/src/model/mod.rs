@@ -5,6 +5,7 @@ pub(crate) mod derived;
 pub(crate) mod joint;
 pub(crate) mod layout;
 pub(crate) mod null_space;
+pub(crate) mod parts;
 pub(crate) mod path;
 pub(crate) mod values;
 pub(crate) mod walk;

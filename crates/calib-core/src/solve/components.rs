@@ -1,11 +1,13 @@
 //! Sums over the samples for the noise levels: equations (2) and (3) of [`noise`](crate::solve::noise).
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::cache::State;
 use crate::model::layout::Model;
+use crate::model::parts::Part;
 use crate::model::values::Values;
 use crate::solve::chunks::{chunked, is_one_chunk};
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
@@ -23,29 +25,52 @@ pub(crate) struct Sums {
     pub traces: DVector<f64>,
     /// tr(V_g V⁻¹ V_h V⁻¹)
     pub products: DMatrix<f64>,
-    /// JᵀV⁻¹V_gV⁻¹J, and last the same of everything that is not to be estimated. Their sum is JᵀV⁻¹J.
-    pub moments: Vec<Local>,
+    moments: Vec<Moments>,
+}
+
+/// Of a part and every group, JᵀV⁻¹V_gV⁻¹J, and last the same of everything that is not to be estimated; `None`: nothing of the group in the part.
+/// Their sum over groups and parts is JᵀV⁻¹J.
+struct Moments {
+    part: Arc<Part>,
+    of: Vec<Option<Local>>,
+}
+
+impl Moments {
+    /// Space for so many rows of a group, or of what is not to be estimated.
+    fn rows(&mut self, group: usize, m: usize) -> &mut [f64] {
+        self.local(group).rows(m)
+    }
+
+    fn local(&mut self, group: usize) -> &mut Local {
+        let part = &self.part;
+        self.of[group].get_or_insert_with(|| {
+            let most = part.max_rows.max(part.slots.len());
+            Local::new(part.columns.len(), most)
+        })
+    }
 }
 
 impl Sums {
     /// Nothing summed yet, for so many groups.
     fn zeros(model: &Model, count: usize) -> Self {
-        let most = model.max_rows.max(model.slots.len());
+        let of_part = |part: &Arc<Part>| Moments {
+            part: Arc::clone(part),
+            of: (0..=count).map(|_| None).collect(),
+        };
         Self {
             squares: DVector::zeros(count),
             traces: DVector::zeros(count),
             products: DMatrix::zeros(count, count),
-            moments: (0..=count)
-                .map(|_| Local::new(model.free(), most))
-                .collect(),
+            moments: model.parts.iter().map(of_part).collect(),
         }
     }
 
     /// Rows without a twist: V⁻¹ is the unit matrix, V_g too.
-    fn add_rest(&mut self, layout: &Layout, rest: &Rest<'_>) {
+    fn add_rest(&mut self, layout: &Layout, part: usize, rest: &Rest<'_>) {
         let of_none = self.squares.len();
         let place = layout.place[rest.group];
-        rest.add_gram(&mut self.moments[place.unwrap_or(of_none)].h);
+        let local = self.moments[part].local(place.unwrap_or(of_none));
+        rest.add_gram(&mut local.h);
         if let Some(g) = place {
             self.squares[g] += rest.cost;
             self.traces[g] += rest.rows as f64;
@@ -54,23 +79,47 @@ impl Sums {
     }
 
     /// Adds the sums over further samples.
-    fn add(&mut self, more: &Self) {
+    fn add(&mut self, more: Self) {
         self.squares += &more.squares;
         self.traces += &more.traces;
         self.products += &more.products;
-        for (moment, more) in self.moments.iter_mut().zip(&more.moments) {
-            moment.h += &more.h;
+        for (moments, more) in self.moments.iter_mut().zip(more.moments) {
+            for (sum, more) in moments.of.iter_mut().zip(more.of) {
+                match (sum, more) {
+                    (Some(sum), Some(more)) => sum.h += more.h,
+                    (sum, more) => *sum = sum.take().or(more),
+                }
+            }
         }
+    }
+
+    /// tr(C JᵀV⁻¹V_gV⁻¹J) of every group.
+    pub(crate) fn traces_with(&self, c: &DMatrix<f64>) -> DVector<f64> {
+        let mut out = DVector::zeros(self.squares.len());
+        for moments in &self.moments {
+            let columns = &moments.part.columns;
+            let own = DMatrix::from_fn(columns.len(), columns.len(), |a, b| {
+                c[(columns[a], columns[b])]
+            });
+            for (x, of_group) in out.iter_mut().zip(&moments.of) {
+                *x += of_group.as_ref().map_or(0.0, |local| local.h.dot(&own));
+            }
+        }
+        out
     }
 
     /// H of the sums and the prior; without gradient and cost.
     pub(crate) fn normal_equations(&self, model: &Model, values: &Values) -> NormalEquations {
         let n = model.free();
         let mut system = NormalEquations::new(n);
-        for moment in &self.moments {
-            for a in 0..n {
-                for b in a..n {
-                    system.h[a * n + b] += moment.h[(a, b)];
+        for moments in &self.moments {
+            let columns = &moments.part.columns;
+            for local in moments.of.iter().flatten() {
+                for (a, &row) in columns.iter().enumerate() {
+                    let to = &mut system.h[row * n..(row + 1) * n];
+                    for (b, &column) in columns.iter().enumerate().skip(a) {
+                        to[column] += local.h[(a, b)];
+                    }
                 }
             }
         }
@@ -99,8 +148,8 @@ fn row_groups(model: &Model, rows: &SampleRows, out: &mut Vec<usize>) {
 struct Layout {
     /// Group → its place among those that are to be estimated.
     place: Vec<Option<usize>>,
-    /// Random effects of every estimated group, and last those of none.
-    slots: Vec<Vec<usize>>,
+    /// Of every part: its random effects of every estimated group, and last those of none.
+    slots: Vec<Vec<Vec<usize>>>,
 }
 
 impl Layout {
@@ -108,11 +157,15 @@ impl Layout {
         let place: Vec<Option<usize>> = (0..model.problem.groups.len())
             .map(|g| groups.iter().position(|h| *h == g))
             .collect();
-        let mut slots = vec![Vec::new(); groups.len() + 1];
-        for (k, slot) in model.slots.iter().enumerate() {
-            let at = slot.group.and_then(|g| place[g]);
-            slots[at.unwrap_or(groups.len())].push(k);
-        }
+        let slots = model.parts.iter().map(|part| {
+            let mut slots = vec![Vec::new(); groups.len() + 1];
+            for (k, &slot) in part.slots.iter().enumerate() {
+                let at = model.slots[slot].group.and_then(|g| place[g]);
+                slots[at.unwrap_or(groups.len())].push(k);
+            }
+            slots
+        });
+        let slots = slots.collect();
         Self { place, slots }
     }
 }
@@ -178,12 +231,12 @@ impl Weighed {
     }
 
     /// Measurement noise: V_g = E_g/θ_g with E_g the unit matrix on the group's rows.
-    fn add_rows(&self, sums: &mut Sums) {
+    fn add_rows(&self, part: usize, sums: &mut Sums) {
         let (m, n) = (self.m, self.n);
         let rest = sums.squares.len();
         for i in 0..m {
-            sums.moments[self.place[i].unwrap_or(rest)]
-                .rows(1)
+            sums.moments[part]
+                .rows(self.place[i].unwrap_or(rest), 1)
                 .copy_from_slice(&self.j[i * n..(i + 1) * n]);
             let Some(g) = self.place[i] else { continue };
             sums.squares[g] += self.e[i] * self.e[i];
@@ -197,18 +250,19 @@ impl Weighed {
     }
 
     /// Random effects: V_u = u uᵀ/θ_u summed over the columns u of the group.
-    fn add_effects(&self, layout: &Layout, sums: &mut Sums) {
+    fn add_effects(&self, layout: &Layout, part: usize, sums: &mut Sums) {
         let (m, k) = (self.m, self.k);
         let rest = sums.squares.len();
-        for (g, slots) in layout.slots.iter().enumerate() {
+        let of_part = &layout.slots[part];
+        for (g, slots) in of_part.iter().enumerate() {
             for &a in slots {
-                let along = self.moment_along(a, sums.moments[g].rows(1));
+                let along = self.moment_along(a, sums.moments[part].rows(g, 1));
                 if g == rest {
                     continue;
                 }
                 sums.squares[g] += along * along;
                 sums.traces[g] += self.upu[a * k + a];
-                for (h, others) in layout.slots[..rest].iter().enumerate() {
+                for (h, others) in of_part[..rest].iter().enumerate() {
                     for &b in others {
                         sums.products[(g, h)] += self.upu[a * k + b] * self.upu[a * k + b];
                     }
@@ -252,26 +306,18 @@ pub(crate) fn sums(
     let model = objective.model;
     let count = model.problem.samples;
     work.cache.update(&model.problem, values);
-    let Workspace {
-        cache,
-        rows,
-        random,
-        ..
-    } = work;
+    let cache = &work.cache;
     let pass = Pass {
         objective,
         layout: &Layout::new(model, groups),
         at: State::new(&model.problem, cache, values),
     };
     if is_one_chunk(count) {
-        return pass.sums(0..count, groups.len(), rows, random);
+        return pass.sums(0..count, groups.len());
     }
     let mut all = Sums::zeros(model, groups.len());
-    let of = |samples: Range<usize>| {
-        let (mut rows, mut random) = (SampleRows::new(model), RandomPart::default());
-        pass.sums(samples, groups.len(), &mut rows, &mut random)
-    };
-    chunked(count, of, |sums| all.add(&sums))?;
+    let of = |samples: Range<usize>| pass.sums(samples, groups.len());
+    chunked(count, of, |sums| all.add(sums))?;
     Some(all)
 }
 
@@ -284,33 +330,31 @@ struct Pass<'a> {
 
 impl Pass<'_> {
     /// Over some samples, for `count` groups.
-    fn sums(
-        &self,
-        samples: Range<usize>,
-        count: usize,
-        rows: &mut SampleRows,
-        random: &mut RandomPart,
-    ) -> Option<Sums> {
+    fn sums(&self, samples: Range<usize>, count: usize) -> Option<Sums> {
         let Objective {
             model,
             weights,
             theta,
         } = self.objective;
         let mut sums = Sums::zeros(model, count);
-        for sample in samples {
-            rows.fill_turned(model, self.at, (weights, theta), sample, |rest| {
-                sums.add_rest(self.layout, rest);
-            });
-            if rows.m == 0 {
-                continue;
+        for (p, part) in model.parts.iter().enumerate() {
+            let (mut rows, mut random) = (SampleRows::of(model, part), RandomPart::default());
+            for sample in samples.clone() {
+                rows.fill_turned(model, self.at, (weights, theta), sample, |rest| {
+                    sums.add_rest(self.layout, p, rest);
+                });
+                if rows.m == 0 {
+                    continue;
+                }
+                rows.whiten_blocks(model, weights, theta, true)?;
+                rows.random_part(&mut random)?;
+                let weighed = Weighed::new(model, self.layout, &rows, &random);
+                weighed.add_rows(p, &mut sums);
+                weighed.add_effects(self.layout, p, &mut sums);
             }
-            rows.whiten_blocks(model, weights, theta, true)?;
-            rows.random_part(random)?;
-            let weighed = Weighed::new(model, self.layout, rows, random);
-            weighed.add_rows(&mut sums);
-            weighed.add_effects(self.layout, &mut sums);
+            let moments = sums.moments[p].of.iter_mut().flatten();
+            moments.for_each(Local::multiply);
         }
-        sums.moments.iter_mut().for_each(Local::multiply);
         Some(sums)
     }
 }

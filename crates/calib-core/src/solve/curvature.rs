@@ -1,5 +1,7 @@
 //! The curvature that Gauss–Newton leaves out, gathered from the gradients met on the way.
 
+use calib_geometry::decompose::dot;
+
 use crate::solve::equations::NormalEquations;
 
 /// K of equation (2) of [`minimize`](crate::solve::minimize).
@@ -59,8 +61,4 @@ impl Curvature {
         }
         self.known = true;
     }
-}
-
-pub(crate) fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(x, y)| x * y).sum()
 }

@@ -7,7 +7,6 @@ use crate::model::cache::EdgeCache;
 use crate::model::layout::Model;
 use crate::model::values::Values;
 use crate::solve::rows::SampleRows;
-use crate::solve::structured::RandomPart;
 
 /// The function to be minimized, but for the values that it is taken at.
 #[derive(Debug, Clone, Copy)]
@@ -63,7 +62,8 @@ impl NormalEquations {
 pub(crate) struct Workspace {
     pub cache: EdgeCache,
     pub rows: SampleRows,
-    pub random: RandomPart,
+    /// The same of each part of the model; none where they were not needed yet.
+    pub parts: Vec<SampleRows>,
     /// The random part of every V_s at the last linearization, by chunks of samples, where random effects make V_s depend
     /// on the values: a step is judged by the same V_s that proposed it. (With V_s moving along, the
     /// cost would reward values that only make the noise look larger.)
@@ -83,7 +83,7 @@ impl Workspace {
         Self {
             cache,
             rows: SampleRows::new(model),
-            random: RandomPart::default(),
+            parts: Vec::new(),
             factors: Vec::new(),
             linearized: None,
         }

@@ -21,13 +21,15 @@
 //! v = (g₊ − g) − H₊ δ − K δ,   K ← K + v vᵀ/(vᵀδ)                                              (2)
 //! ```
 
+use calib_geometry::decompose::dot;
 use serde::{Deserialize, Serialize};
 
 use crate::graph::edge::EdgeKind;
 use crate::model::layout::Model;
 use crate::model::values::{Values, coordinates};
 use crate::solve::bounded::{Damped, bounded_step};
-use crate::solve::curvature::{Curvature, dot};
+use crate::solve::cholesky::{cholesky_in_place, solve_in_place};
+use crate::solve::curvature::Curvature;
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::normal::{accumulate, cost};
 
@@ -431,40 +433,6 @@ fn damped_step(
         step[i] *= scale[i];
     }
     step.iter().all(|x| x.is_finite())
-}
-
-/// Lower Cholesky factor in place (row-major, lower triangle).
-pub(crate) fn cholesky_in_place(a: &mut [f64], n: usize) -> bool {
-    for i in 0..n {
-        for j in 0..=i {
-            let (ri, rj) = (&a[i * n..i * n + j], &a[j * n..j * n + j]);
-            let sum = a[i * n + j] - dot(ri, rj);
-            if i == j {
-                if !(sum > 0.0 && sum.is_finite()) {
-                    return false;
-                }
-                a[i * n + i] = sum.sqrt();
-            } else {
-                a[i * n + j] = sum / a[j * n + j];
-            }
-        }
-    }
-    true
-}
-
-/// y ← (L Lᵀ)⁻¹ y.
-pub(crate) fn solve_in_place(l: &[f64], n: usize, y: &mut [f64]) {
-    for i in 0..n {
-        let sum = dot(&l[i * n..i * n + i], &y[..i]);
-        y[i] = (y[i] - sum) / l[i * n + i];
-    }
-    for i in (0..n).rev() {
-        y[i] /= l[i * n + i];
-        let yi = y[i];
-        for j in 0..i {
-            y[j] -= l[i * n + j] * yi;
-        }
-    }
 }
 
 /// x ⊞ δ: coordinates add; a rotation vector that passed π is replaced by the shorter one.

@@ -1,6 +1,7 @@
 //! The minimum of the stated problem: rows, normal equations, steps, noise, robust weights.
 
 pub(crate) mod bounded;
+pub(crate) mod cholesky;
 pub(crate) mod chunks;
 pub(crate) mod components;
 pub(crate) mod compressed;
@@ -11,6 +12,7 @@ pub(crate) mod minimize;
 pub(crate) mod noise;
 pub(crate) mod normal;
 pub(crate) mod panel;
+pub(crate) mod parted;
 pub(crate) mod predicted;
 pub(crate) mod relabel;
 pub(crate) mod robust;

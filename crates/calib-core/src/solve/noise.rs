@@ -115,8 +115,7 @@ fn expectation(group: &NoiseGroup, theta: f64) -> (f64, f64) {
 fn gradient_and_fisher(sums: &Sums, c: &DMatrix<f64>) -> (DVector<f64>, DMatrix<f64>) {
     let count = sums.squares.len();
     // tr(C Σ JᵀV⁻¹V_gV⁻¹J)
-    let moments = sums.moments[..count].iter();
-    let taken = DVector::from_iterator(count, moments.map(|m| m.h.dot(c)));
+    let taken = sums.traces_with(c);
     // ρ_g = 1 − taken_g / tr(V_g V⁻¹)
     let share = |g: usize| {
         let left = 1.0 - taken[g] / sums.traces[g];

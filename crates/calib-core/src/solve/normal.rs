@@ -1,4 +1,4 @@
-//! Normal equations, summed sample by sample: the dense Jacobian of all samples never exists.
+//! Normal equations, summed part by part and sample by sample: the dense Jacobian of all samples never exists.
 //!
 //! ```text
 //! H = Σ_s J_sᵀ V_s⁻¹ J_s + Λ,   g = Σ_s J_sᵀ V_s⁻¹ e_s + Λ (x − x₀),   Λ = diag(1/σ²)        (1)
@@ -6,9 +6,11 @@
 //! ```
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use crate::model::cache::{EdgeCache, State};
 use crate::model::layout::Model;
+use crate::model::parts::Part;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
 use crate::solve::chunks::{chunk_of, chunked, is_one_chunk};
@@ -53,10 +55,9 @@ pub(crate) fn accumulate_rows(
     let count = model.problem.samples;
     let Workspace {
         cache,
-        rows,
-        random,
         factors,
         linearized,
+        ..
     } = work;
     let kept = count <= MOST_KEPT;
     *linearized = (!kept).then(|| (values.clone(), cache.clone()));
@@ -69,30 +70,30 @@ pub(crate) fn accumulate_rows(
     let mut reused = factors.pop().unwrap_or_default();
     reused.clear();
     factors.clear();
-    let mut add = |(sum, random): (Local, Vec<f64>)| {
-        add_sum(&sum, out);
+    let mut add = |(sums, random): (Vec<Local>, Vec<f64>)| {
+        for (part, sum) in model.parts.iter().zip(&sums) {
+            add_sum(&part.columns, sum, out);
+        }
         factors.push(random);
     };
     if is_one_chunk(count) {
-        let sum = pass.sum(0..count, rows, random, reused);
-        let fine = sum.is_some();
-        sum.into_iter().for_each(add);
+        let sums = pass.sums(0..count, reused);
+        let fine = sums.is_some();
+        sums.into_iter().for_each(add);
         return fine;
     }
-    let sum = |samples: Range<usize>| {
-        let mut rows = SampleRows::new(model);
-        pass.sum(samples, &mut rows, &mut RandomPart::default(), Vec::new())
-    };
-    chunked(count, sum, &mut add).is_some()
+    chunked(count, |samples| pass.sums(samples, Vec::new()), &mut add).is_some()
 }
 
-fn add_sum(sum: &Local, out: &mut NormalEquations) {
+/// Adds the sums of a part with these columns.
+fn add_sum(columns: &[usize], sum: &Local, out: &mut NormalEquations) {
     let n = out.n;
     out.data += sum.cost;
-    for a in 0..n {
-        out.g[a] += sum.g[a];
-        for b in a..n {
-            out.h[a * n + b] += sum.h[(a, b)];
+    for (a, &row) in columns.iter().enumerate() {
+        out.g[row] += sum.g[a];
+        let to = &mut out.h[row * n..(row + 1) * n];
+        for (b, &column) in columns.iter().enumerate().skip(a) {
+            to[column] += sum.h[(a, b)];
         }
     }
 }
@@ -118,22 +119,30 @@ enum RandomAt<'a> {
 }
 
 impl Pass<'_> {
-    /// H, g and cost of some samples, and the random part of each V_s, appended to `factors`.
+    /// H, g and cost of each part over some samples, and the random part of each V_s, appended to `factors`: part after part.
+    fn sums(&self, samples: Range<usize>, mut factors: Vec<f64>) -> Option<(Vec<Local>, Vec<f64>)> {
+        let parts = self.objective.model.parts.iter();
+        let sums: Option<Vec<Local>> = parts
+            .map(|part| self.sum(part, samples.clone(), &mut factors))
+            .collect();
+        Some((sums?, factors))
+    }
+
     fn sum(
         &self,
+        part: &Arc<Part>,
         samples: Range<usize>,
-        rows: &mut SampleRows,
-        random: &mut RandomPart,
-        mut factors: Vec<f64>,
-    ) -> Option<(Local, Vec<f64>)> {
+        factors: &mut Vec<f64>,
+    ) -> Option<Local> {
         let Objective {
             model,
             weights,
             theta,
         } = self.objective;
-        let n = model.free();
+        let (mut rows, mut random) = (SampleRows::of(model, part), RandomPart::default());
+        let n = part.columns.len();
         let at = State::new(&model.problem, self.cache, self.values);
-        let mut sum = Local::new(n, model.max_rows);
+        let mut sum = Local::new(n, part.max_rows);
         for sample in samples {
             if model.of_sample[sample].is_empty() {
                 continue;
@@ -145,10 +154,13 @@ impl Pass<'_> {
                     sum.g[own.column] += g;
                 }
             });
+            if rows.m == 0 {
+                continue;
+            }
             rows.whiten_blocks(model, weights, theta, true)?;
-            rows.random_part(random)?;
+            rows.random_part(&mut random)?;
             if self.kept {
-                random.store(rows, &mut factors);
+                random.store(&rows, factors);
             }
             let m = rows.m;
             random.whiten(&mut rows.r[..m]);
@@ -160,17 +172,30 @@ impl Pass<'_> {
             }
         }
         sum.multiply();
-        Some((sum, factors))
+        Some(sum)
     }
 
     /// eᵀV⁻¹e of some samples, with the random parts of V_s that are given; `None` where it cannot be computed.
-    fn cost(
+    fn cost(&self, samples: Range<usize>, of: RandomAt<'_>) -> Option<f64> {
+        let mut next = 0;
+        let parts = self.objective.model.parts.iter();
+        parts
+            .map(|part| self.cost_of(part, samples.clone(), of, &mut next))
+            .sum()
+    }
+
+    /// That of a part, whose random parts begin at `next` of what is kept.
+    fn cost_of(
         &self,
+        part: &Arc<Part>,
         samples: Range<usize>,
-        rows: &mut SampleRows,
-        random: &mut RandomPart,
         of: RandomAt<'_>,
+        next: &mut usize,
     ) -> Option<f64> {
+        let (rows, random) = (
+            &mut SampleRows::of(self.objective.model, part),
+            &mut RandomPart::default(),
+        );
         let Objective {
             model,
             weights,
@@ -182,7 +207,6 @@ impl Pass<'_> {
             RandomAt::Kept(_) | RandomAt::There(_) => Derivatives::None,
         };
         let mut sum = 0.0;
-        let mut next = 0;
         for sample in samples {
             if model.of_sample[sample].is_empty() {
                 continue;
@@ -193,11 +217,14 @@ impl Pass<'_> {
                 rows.random_part(random)?;
             }
             rows.fill(model, at, weights, sample, wanted);
+            if rows.m == 0 {
+                continue;
+            }
             rows.whiten_blocks(model, weights, theta, false)?;
             let m = rows.m;
             match of {
                 RandomAt::Here => rows.random_part(random)?,
-                RandomAt::Kept(factors) => next += random.load(&factors[next..], m),
+                RandomAt::Kept(factors) => *next += random.load(&factors[*next..], m),
                 RandomAt::There(_) => {}
             }
             random.whiten(&mut rows.r[..m]);
@@ -251,10 +278,9 @@ fn evaluate_cost(objective: Objective, values: &Values, work: &mut Workspace, st
     }
     let Workspace {
         cache,
-        rows,
-        random,
         factors,
         linearized,
+        ..
     } = work;
     let pass = Pass {
         objective,
@@ -269,14 +295,13 @@ fn evaluate_cost(objective: Objective, values: &Values, work: &mut Workspace, st
         None => RandomAt::Kept(factors.get(chunk).map_or(&[][..], Vec::as_slice)),
     };
     if is_one_chunk(count) {
-        let sum = pass.cost(0..count, rows, random, of_chunk(0));
+        let sum = pass.cost(0..count, of_chunk(0));
         return sum.unwrap_or(f64::INFINITY);
     }
     let mut sum = 0.0;
     let cost = |samples: Range<usize>| {
         let stored = of_chunk(chunk_of(samples.start));
-        let mut rows = SampleRows::new(model);
-        pass.cost(samples, &mut rows, &mut RandomPart::default(), stored)
+        pass.cost(samples, stored)
     };
     match chunked(count, cost, |part| sum += part) {
         Some(()) => sum,

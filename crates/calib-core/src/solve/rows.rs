@@ -8,12 +8,15 @@
 //! u are the sample's random effects (joint noise, wobble), w the robust weight of each vector.
 
 use std::ops::Range;
+use std::sync::Arc;
 
+use calib_geometry::decompose;
 use nalgebra::{Matrix6, Vector6};
 
 use crate::graph::measurement::{At, Rows};
 use crate::model::cache::State;
 use crate::model::layout::Model;
+use crate::model::parts::Part;
 use crate::model::path::{Derivatives, PathBuffer};
 use crate::model::pose::Pose;
 use crate::model::values::Values;
@@ -22,6 +25,8 @@ use crate::solve::turned::{Rest, Turned, TurnedBlock};
 /// Scratch and result of [`SampleRows::fill`]; all matrices row-major.
 #[derive(Debug, Clone)]
 pub(crate) struct SampleRows {
+    /// Whose rows, columns and random effects these are.
+    pub part: Arc<Part>,
     pub m: usize,
     pub n: usize,
     pub k: usize,
@@ -46,16 +51,23 @@ pub(crate) struct SampleRows {
 type PointRows = ([Option<usize>; 3], [[f64; 3]; 6]);
 
 impl SampleRows {
+    /// Of all measurements.
     pub(crate) fn new(model: &Model) -> Self {
-        let (m, n, k) = (model.max_rows, model.free(), model.slots.len());
+        Self::of(model, &model.whole)
+    }
+
+    /// Of those of a part.
+    pub(crate) fn of(model: &Model, part: &Arc<Part>) -> Self {
+        let (m, n, k) = (part.max_rows, part.columns.len(), part.slots.len());
         Self {
+            part: Arc::clone(part),
             m: 0,
             n,
             k,
             j: vec![0.0; m * n],
             r: vec![0.0; m],
             g: vec![0.0; m * k],
-            v: vec![0.0; m * m],
+            v: Vec::new(),
             blocks: Vec::with_capacity(m),
             turned: Vec::new(),
             turns: vec![Turned::default(); model.paths.len()],
@@ -77,7 +89,7 @@ impl SampleRows {
         wanted: Derivatives,
     ) {
         self.clear();
-        for (measurement, seen) in seen_together(model, sample) {
+        for (measurement, seen) in self.seen_together(model, sample) {
             self.add_measurement(model, at, weights, (measurement, seen), wanted);
         }
     }
@@ -93,7 +105,7 @@ impl SampleRows {
         mut rest: impl FnMut(&Rest<'_>),
     ) {
         self.clear();
-        for (measurement, seen) in seen_together(model, sample) {
+        for (measurement, seen) in self.seen_together(model, sample) {
             let kept = seen.clone().filter(|&o| weights[o] > 0.0);
             let alike = model.alike_markers(measurement);
             let Some(markers) = alike.filter(|_| 3 * kept.clone().count() > 6) else {
@@ -106,14 +118,16 @@ impl SampleRows {
             let pose = path.evaluate(at, sample, Derivatives::All, buffer);
             let kept = kept.map(|o| (o, (weights[o] / theta[group]).sqrt()));
             let turn = &mut self.turns[measurement];
-            turn.see(model, at.values, markers, &pose, kept);
+            turn.see((model, &self.part), at.values, markers, &pose, kept);
             let (first, n, k) = (self.m, self.n, self.k);
             self.m += 6;
             self.r[first..first + 6].copy_from_slice(&turn.residual);
             let j = &mut self.j[first * n..(first + 6) * n];
-            turn.write_jacobian(j, n, &path.columns, &buffer.columns);
+            let columns = self.part.path_columns(measurement);
+            turn.write_jacobian(j, n, columns, &buffer.columns);
             let g = &mut self.g[first * k..(first + 6) * k];
-            turn.write_twists(g, k, &path.slots, &buffer.slots);
+            let slots = self.part.path_slots(measurement);
+            turn.write_twists(g, k, slots, &buffer.slots);
             self.turned.push(TurnedBlock {
                 measurement,
                 group,
@@ -122,6 +136,16 @@ impl SampleRows {
             });
             rest(&turn.rest(group));
         }
+    }
+
+    /// What each measurement of the part saw at a sample: its observations.
+    fn seen_together<'m>(
+        &self,
+        model: &'m Model,
+        sample: usize,
+    ) -> impl Iterator<Item = (usize, Range<usize>)> + use<'m> {
+        let part = Arc::clone(&self.part);
+        seen_together(model, sample).filter(move |(measurement, _)| part.has(*measurement))
     }
 
     fn clear(&mut self) {
@@ -160,7 +184,7 @@ impl SampleRows {
                 self.fill_jacobian(model, measurement, &rows, first);
             }
             if wanted != Derivatives::None && self.k > 0 {
-                self.fill_random(model, measurement, &rows, first);
+                self.fill_random(measurement, &rows, first);
             }
         }
     }
@@ -193,13 +217,13 @@ impl SampleRows {
         for (i, out) in own.enumerate() {
             out.fill(0.0);
             let twists = &self.buffers[measurement].columns;
-            for (&global, twist) in model.paths[measurement].columns.iter().zip(twists) {
-                out[global] = dot(&rows.m[i], twist);
+            for (&own, twist) in self.part.path_columns(measurement).iter().zip(twists) {
+                out[own] = dot(&rows.m[i], twist);
             }
             if let Some((columns, jacobian)) = &point {
                 for (c, &d) in columns.iter().zip(&jacobian[i]) {
                     if let Some(c) = c {
-                        out[*c] += d;
+                        out[self.part.column(*c)] += d;
                     }
                 }
             }
@@ -208,14 +232,14 @@ impl SampleRows {
 
     /// Rows of G from `first` on: `∂e/∂u = ∂e/∂ξ ∂ξ/∂u`.
     #[inline]
-    fn fill_random(&mut self, model: &Model, measurement: usize, rows: &Rows, first: usize) {
+    fn fill_random(&mut self, measurement: usize, rows: &Rows, first: usize) {
         let k = self.k;
         let own = self.g[first * k..self.m * k].chunks_exact_mut(k);
         for (i, out) in own.enumerate() {
             out.fill(0.0);
             let twists = &self.buffers[measurement].slots;
-            for (&global, twist) in model.paths[measurement].slots.iter().zip(twists) {
-                out[global] = dot(&rows.m[i], twist);
+            for (&own, twist) in self.part.path_slots(measurement).iter().zip(twists) {
+                out[own] = dot(&rows.m[i], twist);
             }
         }
     }
@@ -223,7 +247,8 @@ impl SampleRows {
     /// V_s of equation (1) into the lower triangle of `v`. `theta`: σ² per group.
     pub(crate) fn covariance(&mut self, model: &Model, weights: &[f64], theta: &[f64]) {
         let m = self.m;
-        self.v[..m * m].fill(0.0);
+        self.v.clear();
+        self.v.resize(m * m, 0.0);
         // V_s = blockdiag( σ_g² shape / w )
         for &(o, first, _) in &self.blocks {
             add_block(model, o, |i, j, group, shape| {
@@ -231,8 +256,8 @@ impl SampleRows {
             });
         }
         // V_s += Σ_k σ_k² g_k g_kᵀ
-        for (s, slot) in model.slots.iter().enumerate() {
-            let variance = slot.group.map_or(1.0, |g| theta[g]);
+        for (s, &slot) in self.part.slots.iter().enumerate() {
+            let variance = model.slots[slot].group.map_or(1.0, |g| theta[g]);
             for i in 0..m {
                 let gi = self.g[i * self.k + s] * variance;
                 if gi != 0.0 {
@@ -251,10 +276,8 @@ impl SampleRows {
         for j in 0..m {
             for i in j..m {
                 // L_jj² = V_jj − Σ L_jl²,   L_ij = (V_ij − Σ L_il L_jl) / L_jj,   log det V = 2 Σ log L_jj
-                let mut sum = self.v[i * m + j];
-                for l in 0..j {
-                    sum -= self.v[i * m + l] * self.v[j * m + l];
-                }
+                let (of_i, of_j) = (&self.v[i * m..i * m + j], &self.v[j * m..j * m + j]);
+                let sum = self.v[i * m + j] - decompose::dot(of_i, of_j);
                 if i == j {
                     if !(sum > 0.0 && sum.is_finite()) {
                         return None;

@@ -43,11 +43,8 @@ impl SampleRows {
     ) -> Option<()> {
         let (n, k) = (self.n, self.k);
         if k > 0 {
-            let sigma: Vec<f64> = model
-                .slots
-                .iter()
-                .map(|slot| slot.group.map_or(1.0, |g| theta[g]).sqrt())
-                .collect();
+            let level = |&slot: &usize| model.slots[slot].group.map_or(1.0, |g| theta[g]);
+            let sigma: Vec<f64> = self.part.slots.iter().map(|s| level(s).sqrt()).collect();
             for row in self.g[..self.m * k].chunks_exact_mut(k) {
                 row.iter_mut().zip(&sigma).for_each(|(x, s)| *x *= s);
             }

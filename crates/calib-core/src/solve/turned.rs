@@ -13,6 +13,7 @@ use nalgebra::{DMatrix, Matrix3, Vector3, Vector6};
 
 use crate::graph::measurement::Markers;
 use crate::model::layout::Model;
+use crate::model::parts::Part;
 use crate::model::pose::Pose;
 use crate::model::values::Values;
 use crate::solve::six_rows::upper_product;
@@ -28,7 +29,7 @@ pub(crate) struct TurnedBlock {
     pub r: Matrix3<f64>,
 }
 
-/// An unknown coordinate of a marker: column c of B is `scale` in one row.
+/// An unknown coordinate of a marker: column c of B, a column of the part, is `scale` in one row.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Own {
     pub column: usize,
@@ -86,7 +87,7 @@ impl Turned {
     /// A sample: its markers by their observations with s, at this pose of the body.
     pub(crate) fn see(
         &mut self,
-        model: &Model,
+        (model, part): (&Model, &Part),
         values: &Values,
         markers: &Markers,
         pose: &Pose,
@@ -107,7 +108,7 @@ impl Turned {
         if *seen != self.seen || *places != self.places {
             std::mem::swap(&mut self.seen, seen);
             std::mem::swap(&mut self.places, places);
-            self.turn(model);
+            self.turn(model, part);
         }
         // Qᵀ s e, then what it leaves
         self.residual = [0.0; 6];
@@ -131,7 +132,7 @@ impl Turned {
     }
 
     /// Q, U, B and Bᵀ(I − QQᵀ)B of the markers that are seen now.
-    fn turn(&mut self, model: &Model) {
+    fn turn(&mut self, model: &Model, part: &Part) {
         let mut a = DMatrix::zeros(3 * self.seen.len(), 6);
         self.own.clear();
         for (m, (&(point, s), p)) in self.seen.iter().zip(&self.places).enumerate() {
@@ -144,7 +145,7 @@ impl Turned {
             for (axis, id) in ids.iter().enumerate() {
                 if let Some(column) = model.column_of[id.index()] {
                     self.own.push(Own {
-                        column,
+                        column: part.column(column),
                         row: 3 * m + axis,
                         scale: s,
                     });

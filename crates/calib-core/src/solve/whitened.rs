@@ -4,13 +4,15 @@
 //! V_s = L Lᵀ,   A_s = L⁻¹ J_s,   w_s = L⁻¹ e_s,   C = H⁻¹                                     (1)
 //! ```
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DMatrixView, DVector};
 
 use crate::model::cache::State;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
+use crate::solve::cholesky::cholesky_in_place;
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
-use crate::solve::minimize::{cholesky_in_place, solve_in_place};
+use crate::solve::parted::Parted;
+use crate::solve::rows::SampleRows;
 
 /// C of equation (1), (H + tiny ridge)⁻¹: directions that nothing determines have A v = 0 and do not matter in A C Aᵀ.
 pub(crate) fn covariance_of(system: &NormalEquations) -> Option<DMatrix<f64>> {
@@ -42,22 +44,40 @@ pub(crate) fn covariance_of(system: &NormalEquations) -> Option<DMatrix<f64>> {
             l[i * n + i] = 1.0 + ridge;
         }
     }
-    let mut c = DMatrix::zeros(n, n);
-    let mut y = vec![0.0; n];
-    for k in 0..n {
-        y.fill(0.0);
-        y[k] = 1.0;
-        solve_in_place(&l, n, &mut y);
-        for i in 0..n {
-            c[(i, k)] = y[i] * scale[i] * scale[k];
-        }
+    // C = S L⁻ᵀ L⁻¹ S; row after row of L⁻¹ is column after column of its transpose.
+    let mut inverse = lower_inverse(&l, n);
+    for row in inverse.chunks_exact_mut(n.max(1)) {
+        row.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);
     }
-    Some(c)
+    let transposed = DMatrixView::from_slice(&inverse, n, n);
+    Some(transposed * transposed.transpose())
+}
+
+/// L⁻¹ of a lower triangular L, both row by row.
+pub(crate) fn lower_inverse(l: &[f64], n: usize) -> Vec<f64> {
+    let mut out = vec![0.0; n * n];
+    for i in 0..n {
+        // row i of L⁻¹ = (e_i − Σ_j<i L_ij row j) / L_ii
+        let (done, rest) = out.split_at_mut(i * n);
+        let row = &mut rest[..=i];
+        for (j, &factor) in l[i * n..i * n + i].iter().enumerate() {
+            if factor != 0.0 {
+                let above = &done[j * n..=j * n + j];
+                row.iter_mut()
+                    .zip(above)
+                    .for_each(|(x, y)| *x -= factor * y);
+            }
+        }
+        row[i] = 1.0;
+        let d = 1.0 / l[i * n + i];
+        row.iter_mut().for_each(|x| *x *= d);
+    }
+    out
 }
 
 /// One sample in whitened form, V = LLᵀ: A = L⁻¹J (m × n), w (m), L⁻¹ (m × m).
 pub(crate) struct Whitened {
-    pub a: DMatrix<f64>,
+    pub a: Parted,
     pub w: DVector<f64>,
     pub l: DMatrix<f64>,
     pub l_inverse: DMatrix<f64>,
@@ -78,39 +98,59 @@ pub(crate) fn whitened(
         weights,
         theta,
     } = objective;
-    let rows = &mut work.rows;
-    let at = State::new(&model.problem, &work.cache, values);
-    rows.fill(model, at, weights, sample, Derivatives::All);
-    if rows.m == 0 {
+    let Workspace { cache, parts, .. } = work;
+    if parts.is_empty() {
+        let of = |part| SampleRows::of(model, part);
+        parts.extend(model.parts.iter().map(of));
+    }
+    let at = State::new(&model.problem, cache, values);
+    let mut log_det = 0.0;
+    for rows in parts.iter_mut() {
+        rows.fill(model, at, weights, sample, Derivatives::All);
+        if rows.m > 0 {
+            rows.covariance(model, weights, theta);
+            log_det += rows.factor()?;
+            rows.whiten(true);
+        }
+    }
+    // Rows of all parts in the order of their observations.
+    let mut blocks: Vec<(usize, usize, usize)> = Vec::new();
+    for rows in parts.iter() {
+        blocks.extend(&rows.blocks);
+    }
+    if blocks.is_empty() {
         return None;
     }
-    let (m, n) = (rows.m, rows.n);
-    rows.covariance(model, weights, theta);
-    let log_det = rows.factor()?;
-    rows.whiten(true);
-    let mut l = DMatrix::zeros(m, m);
-    let mut l_inverse = DMatrix::zeros(m, m);
-    for i in 0..m {
-        for j in 0..=i {
-            l[(i, j)] = rows.v[i * m + j];
-        }
+    blocks.sort_unstable();
+    let mut m = 0;
+    for (_, first, rows) in &mut blocks {
+        *first = m;
+        m += *rows;
     }
-    // L L⁻¹ = I, column by column
-    for c in 0..m {
-        for i in c..m {
-            let mut sum = if i == c { 1.0 } else { 0.0 };
-            for j in c..i {
-                sum -= l[(i, j)] * l_inverse[(j, c)];
-            }
-            l_inverse[(i, c)] = sum / l[(i, i)];
-        }
-    }
-    Some(Whitened {
-        a: DMatrix::from_row_slice(m, n, &rows.j[..m * n]),
-        w: DVector::from_row_slice(&rows.r[..m]),
-        l,
-        l_inverse,
+    let place = |o: usize| blocks[blocks.partition_point(|b| b.0 < o)].1;
+    let mut out = Whitened {
+        a: Parted::new(m, model.free()),
+        w: DVector::zeros(m),
+        l: DMatrix::zeros(m, m),
+        l_inverse: DMatrix::zeros(m, m),
         log_det,
-        blocks: rows.blocks.clone(),
-    })
+        blocks: Vec::new(),
+    };
+    for rows in parts.iter().filter(|rows| rows.m > 0) {
+        let own = rows.blocks.iter();
+        let places: Vec<usize> = own
+            .flat_map(|&(o, _, count)| (0..count).map(move |i| place(o) + i))
+            .collect();
+        let inverse = lower_inverse(&rows.v[..rows.m * rows.m], rows.m);
+        for (i, &row) in places.iter().enumerate() {
+            out.w[row] = rows.r[i];
+            for (j, &column) in places[..=i].iter().enumerate() {
+                out.l[(row, column)] = rows.v[i * rows.m + j];
+                out.l_inverse[(row, column)] = inverse[i * rows.m + j];
+            }
+        }
+        out.a.put(&rows.part, places, &rows.j[..rows.m * rows.n]);
+    }
+    out.blocks = blocks;
+    Some(out)
 }

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use calib_core::EffectKind;
 use calib_core::effect::{Drives, Source};
-use calib_geometry::decompose::symmetric_eigen;
 use calib_geometry::se3;
 use calib_model::file::{
     Input, ModelBody, ModelEffect, ModelJoint, ModelLink, ModelMimic, ModelMotion, ModelNumber,
@@ -278,12 +277,7 @@ fn uncertainty(inputs: &Inputs, fit: &MlFit) -> ModelUncertainty {
             g[(row, column)] = change / step;
         }
     }
-    let eigen = symmetric_eigen(&solution.information.covariance);
-    let mut half = eigen.vectors;
-    for (k, value) in eigen.values.iter().enumerate() {
-        half.column_mut(k).scale_mut(value.max(0.0).sqrt());
-    }
-    let root = g * half;
+    let root = g * solution.half_covariance();
     let rows = named.into_iter().zip(root.row_iter());
     let known = rows.filter(|(_, row)| row.iter().any(|x| *x != 0.0));
     let (numbers, root) = known

@@ -2,7 +2,7 @@
 
 use super::{Plot, PlotKind};
 use crate::{Class, DataInformation, Report, number};
-use calib_geometry::decompose::symmetric_eigen;
+use calib_geometry::decompose::semidefinite_eigen;
 use nalgebra::{DMatrix, DVector};
 
 /// Parameters in the picture: more are not readable.
@@ -98,7 +98,7 @@ fn covariance(of: &DataInformation) -> Option<DMatrix<f64>> {
     if h.iter().any(|x| !x.is_finite()) {
         return None;
     }
-    let eigen = symmetric_eigen(&h);
+    let eigen = semidefinite_eigen(&h);
     let largest = eigen.values.iter().fold(0.0_f64, |a, b| a.max(*b));
     let mut c = DMatrix::zeros(n, n);
     for (k, value) in eigen.values.iter().enumerate() {

@@ -150,7 +150,7 @@ fn drawn(design: &Design, shifts: &[DMatrix<f64>], z: &[DVector<f64>], priors: &
     let mut linear = DVector::<f64>::zeros(width);
     let count = design.kept.len();
     for (place, (kept, z)) in design.kept.iter().zip(z).enumerate() {
-        g.gemv_tr(1.0, &kept.a, z, 1.0);
+        kept.a.add_transposed_vector(z, &mut g);
         let own = kept.b.tr_mul(z);
         linear.axpy(place as f64 / (count - 1) as f64 - 0.5, &own, 1.0);
         steps.push(&steps[place] + own);

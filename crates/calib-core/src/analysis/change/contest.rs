@@ -226,10 +226,9 @@ impl Solution {
         let samples = self.looked_at().samples;
         self.each_numbered_sample(effects, &samples, &mut work, |number, s, alpha| {
             let b = self.columns_at(changes, columns, &ranges, (number, s, alpha), &inner);
-            let transposed = s.a.transpose();
-            h.gemm(1.0, &transposed, &s.a, 1.0);
-            g.gemv(1.0, &transposed, &s.w, 1.0);
-            e.gemm(1.0, &transposed, &b, 1.0);
+            s.a.add_gram(1.0, &mut h);
+            s.a.add_transposed_vector(&s.w, &mut g);
+            s.a.add_transposed_times(1.0, &b, &mut e);
             own.gemm(1.0, &b.transpose(), &b, 1.0);
             u += b.tr_mul(&s.w);
             cost += s.w.norm_squared();

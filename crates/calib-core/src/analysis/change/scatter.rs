@@ -30,6 +30,7 @@ use crate::graph::edge::EdgeKind;
 use crate::graph::ids::EdgeId;
 use crate::solve::equations::{NormalEquations, Workspace};
 use crate::solve::normal::add_prior;
+use crate::solve::parted::Parted;
 use crate::solve::whitened::{covariance_of, whitened};
 
 /// Samples that are looked at: (1) costs their cube.
@@ -101,7 +102,7 @@ impl Left {
 
 /// One sample in whitened form.
 struct Sample {
-    a: DMatrix<f64>,
+    a: Parted,
     /// Columns of the joints, in the order of [`Level::joints`].
     joints: DMatrix<f64>,
     /// Columns of the suspects.
@@ -355,9 +356,9 @@ impl Level {
             let tested = &rows.l_inverse * own_rows;
             let at = (sample, &rows, &tested);
             let b = solution.columns_at(&candidates, &columns, &out.ranges, at, &work);
-            h.gemm_tr(1.0, &rows.a, &rows.a, 1.0);
-            g.gemv_tr(1.0, &rows.a, &rows.w, 1.0);
-            e.gemm_tr(1.0, &rows.a, &b, 1.0);
+            rows.a.add_gram(1.0, &mut h);
+            rows.a.add_transposed_vector(&rows.w, &mut g);
+            rows.a.add_transposed_times(1.0, &b, &mut e);
             own.gemm_tr(1.0, &b, &b, 1.0);
             out.cost += rows.w.norm_squared();
             out.freedom += rows.w.len() as f64;
@@ -377,7 +378,7 @@ impl Level {
         let step = -(&out.covariance * &gradient);
         out.cost += system.prior + gradient.dot(&step);
         for (w, sample) in out.residuals.iter_mut().zip(&out.samples) {
-            w.gemv(1.0, &sample.a, &step, 1.0);
+            *w += sample.a.times_vector(&step);
             out.u.gemv_tr(1.0, &sample.suspects, w, 1.0);
         }
         out.ce = &out.covariance * &e;
@@ -433,7 +434,10 @@ impl Level {
         let mut cross = DMatrix::<f64>::zeros(m, width);
         for ((sample, w), &group) in self.samples.iter().zip(&self.residuals).zip(groups) {
             let own = sample.joints.column(joint);
-            e.column_mut(group).gemv_tr(1.0, &sample.a, &own, 1.0);
+            let mut to = e.column_mut(group);
+            sample
+                .a
+                .each_transposed(&own.into_owned(), |c, x| to[c] += x);
             u[group] += own.dot(w);
             diagonal[group] += own.norm_squared();
             let beside = sample.suspects.tr_mul(&own);

@@ -6,6 +6,7 @@ use super::columns::{Candidates, Pattern};
 use crate::analysis::solution::Solution;
 use crate::solve::equations::{NormalEquations, Workspace};
 use crate::solve::normal::add_prior;
+use crate::solve::parted::Parted;
 use crate::solve::whitened::{Whitened, covariance_of, whitened};
 
 /// Fewest samples on either side of a step: one or two bad poses are outliers, not a change.
@@ -39,7 +40,7 @@ pub(super) struct Found {
 
 /// One sample, kept for the simulation.
 pub(super) struct Kept {
-    pub a: DMatrix<f64>,
+    pub a: Parted,
     pub b: DMatrix<f64>,
     /// L and L⁻¹.
     pub l: DMatrix<f64>,
@@ -208,11 +209,9 @@ impl Design {
                 continue;
             };
             let b = candidates.whitened(solution, sample, &rows, &work);
-            // The product of a transpose has no fast kernel.
-            let transposed = rows.a.transpose();
-            h.gemm(1.0, &transposed, &rows.a, 1.0);
-            g.gemv(1.0, &transposed, &rows.w, 1.0);
-            let (ab, bb) = (&transposed * &b, b.transpose() * &b);
+            rows.a.add_gram(1.0, &mut h);
+            rows.a.add_transposed_vector(&rows.w, &mut g);
+            let (ab, bb) = (rows.a.transposed_times(&b), b.transpose() * &b);
             let bw = b.tr_mul(&rows.w);
             self.cost += rows.w.norm_squared();
             self.rows += rows.w.len() as f64;

@@ -68,7 +68,7 @@ pub(super) fn scaled_sample(
     // The product of a transpose has no fast kernel.
     let transposed = scaled.transpose();
     Scaled {
-        k: &transposed * &rows.a,
+        k: rows.a.transposed_times(&scaled).transpose(),
         y: &transposed * &rows.w,
         w: &transposed * &scaled,
         keys: own,

@@ -160,11 +160,10 @@ impl Solution {
             let transposed = alpha.transpose();
             u += &transposed * &s.w;
             raw.gemm(1.0, &transposed, alpha, 1.0);
-            let transposed = s.a.transpose();
-            b.gemm(1.0, &transposed, alpha, 1.0);
+            s.a.add_transposed_times(1.0, alpha, &mut b);
             if !looked_at.all {
-                h.gemm(1.0, &transposed, &s.a, 1.0);
-                g.gemv(1.0, &transposed, &s.w, 1.0);
+                s.a.add_gram(1.0, &mut h);
+                s.a.add_transposed_vector(&s.w, &mut g);
             }
         });
         let c = if looked_at.all {

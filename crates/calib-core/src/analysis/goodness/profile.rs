@@ -77,10 +77,9 @@ impl Solution {
         let (mut u, mut raw) = (vec![0.0; count], vec![0.0; count]);
         let (mut cost, mut rows, mut log_det) = (0.0, 0.0, 0.0);
         self.each_sample(candidates, used, &mut work, |s, alpha| {
-            let transposed = s.a.transpose();
-            h.gemm(1.0, &transposed, &s.a, 1.0);
-            g.gemv(1.0, &transposed, &s.w, 1.0);
-            b.gemm(1.0, &transposed, alpha, 1.0);
+            s.a.add_gram(1.0, &mut h);
+            s.a.add_transposed_vector(&s.w, &mut g);
+            s.a.add_transposed_times(1.0, alpha, &mut b);
             for (k, own) in alpha.column_iter().enumerate() {
                 u[k] += own.dot(&s.w);
                 raw[k] += own.norm_squared();

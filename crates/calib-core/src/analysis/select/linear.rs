@@ -73,10 +73,16 @@ impl Linearization {
             let mut work = work.clone();
             let of = |&sample| Some((sample, whitened(objective, &at.values, sample, &mut work)?));
             let rows: Vec<(usize, Whitened)> = chunk.iter().filter_map(of).collect();
-            let each: Vec<_> = rows.iter().map(|(_, s)| (&s.a, &s.w)).collect();
+            let dense: Vec<DMatrix<f64>> = rows.iter().map(|(_, s)| s.a.dense()).collect();
+            let each: Vec<_> = dense
+                .iter()
+                .zip(&rows)
+                .map(|(a, (_, s))| (a, &s.w))
+                .collect();
             let mut sums = Sums::of(n, &each);
-            let looked_at = rows.into_iter().filter(|(sample, _)| sample % step == 0);
-            let own = looked_at.map(|(sample, s)| Sample::of(&model, sample, s, theta));
+            let rows = rows.into_iter().zip(dense);
+            let looked_at = rows.filter(|((sample, _), _)| sample % step == 0);
+            let own = looked_at.map(|((sample, s), a)| Sample::of(&model, sample, (s, a), theta));
             sums.samples = own.collect();
             sums
         };

@@ -21,7 +21,12 @@ pub(super) struct Sample {
 }
 
 impl Sample {
-    pub(super) fn of(model: &Model, number: usize, s: Whitened, theta: &[f64]) -> Self {
+    pub(super) fn of(
+        model: &Model,
+        number: usize,
+        (s, a): (Whitened, DMatrix<f64>),
+        theta: &[f64],
+    ) -> Self {
         let m = s.w.len();
         let mut weighted = DMatrix::zeros(m, m);
         for &(o, first, rows) in &s.blocks {
@@ -33,7 +38,7 @@ impl Sample {
         }
         Self {
             number,
-            a: s.a,
+            a,
             w: s.w,
             l: s.l,
             weighted,

@@ -45,7 +45,7 @@ impl Solution {
             let Some(s) = whitened(self.objective(), &self.values, sample, &mut work) else {
                 continue;
             };
-            let j = &s.l * &s.a;
+            let j = &s.l * s.a.dense();
             let of_rows = (&j * &self.information.covariance).component_mul(&j);
             let squares = of_rows.column_sum();
             for &(observation, first, rows) in &s.blocks {

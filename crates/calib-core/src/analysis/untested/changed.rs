@@ -100,7 +100,7 @@ impl<'a> Changed<'a> {
     pub(super) fn add(
         &mut self,
         solution: &Solution,
-        (sample, s, transposed): (usize, &Whitened, &DMatrix<f64>),
+        (sample, s): (usize, &Whitened),
         factor: f64,
         work: &Workspace,
     ) {
@@ -112,7 +112,7 @@ impl<'a> Changed<'a> {
         let own = all.columns_range(self.columns.clone()).into_owned();
         if !held_out {
             let holds = self.holds[sample];
-            self.b.gemm(factor * holds, transposed, &own, 1.0);
+            s.a.add_transposed_times(factor * holds, &own, &mut self.b);
             self.own.gemm_tr(factor * holds * holds, &own, &own, 1.0);
             return;
         }
@@ -128,7 +128,7 @@ impl<'a> Changed<'a> {
             along: DVector::zeros(k),
             own: DMatrix::zeros(k, k),
         });
-        sums.b.gemm(factor, transposed, &own, 1.0);
+        s.a.add_transposed_times(factor, &own, &mut sums.b);
         sums.along.gemv_tr(factor, &own, &s.w, 1.0);
         sums.own.gemm_tr(factor, &own, &own, 1.0);
     }
@@ -148,7 +148,7 @@ impl<'a> Changed<'a> {
                     .map(|(i, c)| self.displacement(i, p) * (c * self.used))
                     .sum()
             };
-            common.displaced(&(&b * c), postures.iter().map(at))
+            common.displaced(&(&common.covariance * (&b * c)), postures.iter().map(at))
         };
         let mut out = vec![Direction {
             displaced: displaced(&jump),

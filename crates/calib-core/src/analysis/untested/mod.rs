@@ -168,9 +168,13 @@ struct Direction {
 }
 
 impl Common {
-    /// d_m − G_m H⁻¹b of equation (3), of all postures.
-    fn displaced(&self, b: &DVector<f64>, at: impl Iterator<Item = Vector3<f64>>) -> DVector<f64> {
-        let mut d = -(&self.g * (&self.covariance * b));
+    /// d_m − G_m H⁻¹b of equation (3), of all postures; `step` is H⁻¹b.
+    fn displaced(
+        &self,
+        step: &DVector<f64>,
+        at: impl Iterator<Item = Vector3<f64>>,
+    ) -> DVector<f64> {
+        let mut d = -(&self.g * step);
         let root = (d.len() as f64 / 3.0).sqrt();
         for (m, moved) in at.enumerate() {
             let mut place = d.rows_mut(3 * m, 3);
@@ -188,13 +192,14 @@ impl Common {
         postures: &[MovedPoint],
     ) -> Direction {
         let b: DVector<f64> = design.b.column(k).into();
-        let information = (design.own[k] - b.dot(&(&self.covariance * &b))).max(0.0);
+        let step = &self.covariance * &b;
+        let information = (design.own[k] - b.dot(&step)).max(0.0);
         let v = 1.0 / (information / self.level + effect.sigma.powi(-2));
         let estimate = -v * (seen.score[k] + b.dot(&self.shift)) / self.level;
         let at = postures.iter().zip(&effect.at_postures);
         let at = at.map(|(posture, value)| posture.displacement(effect.moves) * *value);
         Direction {
-            displaced: self.displaced(&b, at),
+            displaced: self.displaced(&step, at),
             size: (estimate, v.sqrt()),
         }
     }

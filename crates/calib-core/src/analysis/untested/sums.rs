@@ -129,23 +129,21 @@ impl Design {
             let Some(s) = whitened(objective, &solution.values, sample, &mut work) else {
                 continue;
             };
-            // The product of a transpose has no fast kernel.
-            let transposed = s.a.transpose();
             let h = match solution.model.is_held_out(sample) {
                 true => &mut out.held_out,
                 false => &mut out.fitted,
             };
-            h.gemm(factor, &transposed, &s.a, 1.0);
+            s.a.add_gram(factor, h);
             let motions = columns.at(sample, &s, &work);
             let of =
                 |i: usize, k: usize| motions[(i, columns.of[k])] * effects[k].at_samples[place];
             let own = DMatrix::from_fn(s.w.len(), effects.len(), of);
-            out.b.gemm(factor, &transposed, &own, 1.0);
+            s.a.add_transposed_times(factor, &own, &mut out.b);
             for (sum, column) in out.own.iter_mut().zip(own.column_iter()) {
                 *sum += factor * column.norm_squared();
             }
             for changed in changes.iter_mut().flatten() {
-                changed.add(solution, (sample, &s, &transposed), factor, &work);
+                changed.add(solution, (sample, &s), factor, &work);
             }
         }
         out
@@ -189,7 +187,7 @@ impl Seen {
             let (mut sum, mut work) = (none(), at.clone());
             for &(place, sample) in places {
                 if let Some(s) = whitened(objective, &solution.values, sample, &mut work) {
-                    sum.g.gemv_tr(1.0, &s.a, &s.w, 1.0);
+                    s.a.add_transposed_vector(&s.w, &mut sum.g);
                     let along = columns.at(sample, &s, &work).tr_mul(&s.w);
                     for (k, effect) in columns.effects.iter().enumerate() {
                         sum.score[k] += along[columns.of[k]] * effect.at_samples[place];

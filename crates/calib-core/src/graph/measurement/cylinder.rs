@@ -1,5 +1,7 @@
 //! A point on a cylinder: `e = |E(d)ᵀ (R p + t − o)| − r` with E(d) across its axis, one row, m.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Point3, Unit, Vector3};
 
 use super::{At, Input, Kind, Rows, isotropic};
@@ -30,6 +32,10 @@ impl Kind for Cylinder {
 
     fn rows(&self) -> usize {
         1
+    }
+
+    fn points(&self) -> BTreeSet<PointId> {
+        BTreeSet::from([self.point])
     }
 
     fn check(&self, input: &Input<'_>) -> Result<(), Error> {

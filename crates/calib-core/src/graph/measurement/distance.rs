@@ -1,5 +1,7 @@
 //! A point at a distance: `e = |R p + t − y| − ℓ`, one row, m.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Point3, Vector3};
 
 use super::{At, Input, Kind, Rows, isotropic};
@@ -26,6 +28,10 @@ impl Kind for Distance {
 
     fn rows(&self) -> usize {
         1
+    }
+
+    fn points(&self) -> BTreeSet<PointId> {
+        BTreeSet::from([self.point])
     }
 
     fn check(&self, input: &Input<'_>) -> Result<(), Error> {

@@ -1,5 +1,7 @@
 //! A point on a line: `e = E(d)ᵀ (R p + t − o)` with E(d) across the line, two rows, m.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Point3, Unit, Vector3};
 
 use super::rows::tangent_basis;
@@ -29,6 +31,10 @@ impl Kind for Line {
 
     fn rows(&self) -> usize {
         2
+    }
+
+    fn points(&self) -> BTreeSet<PointId> {
+        BTreeSet::from([self.point])
     }
 
     fn check(&self, input: &Input<'_>) -> Result<(), Error> {

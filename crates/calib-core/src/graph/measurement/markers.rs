@@ -1,6 +1,6 @@
 //! Marker points: `e = R p + t − y`, three rows in axes of `from`, m.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Matrix3, Point3};
 
@@ -47,6 +47,10 @@ impl Kind for Markers {
 
     fn rows(&self) -> usize {
         3
+    }
+
+    fn points(&self) -> BTreeSet<PointId> {
+        self.observations.iter().map(|o| o.point).collect()
     }
 
     fn check(&self, input: &Input<'_>) -> Result<(), Error> {

@@ -19,8 +19,10 @@
 //! To add a kind: write its file (the fields, `Kind` for them, and the test of its derivatives), name it in
 //! [`MeasurementKind`] and in the one `match` below. Layout, solver, robust weights, validation and input check follow.
 
+use std::collections::BTreeSet;
+
 use crate::graph::error::Error;
-use crate::graph::ids::{EdgeId, FrameId, GroupId};
+use crate::graph::ids::{EdgeId, FrameId, GroupId, PointId};
 
 mod closed;
 mod cylinder;
@@ -89,6 +91,11 @@ pub(crate) trait Kind {
 
     /// Rows per observation, at most 6.
     fn rows(&self) -> usize;
+
+    /// The points that it measures.
+    fn points(&self) -> BTreeSet<PointId> {
+        BTreeSet::new()
+    }
 
     /// Everything that can be wrong with the numbers given.
     fn check(&self, input: &Input<'_>) -> Result<(), Error>;

@@ -1,5 +1,7 @@
 //! A point at a height over a plane: `e = nᵀ (R p + t) − h`, one row, m.
 
+use std::collections::BTreeSet;
+
 use nalgebra::{Unit, Vector3};
 
 use super::{At, Input, Kind, Rows, isotropic};
@@ -26,6 +28,10 @@ impl Kind for Plane {
 
     fn rows(&self) -> usize {
         1
+    }
+
+    fn points(&self) -> BTreeSet<PointId> {
+        BTreeSet::from([self.point])
     }
 
     fn check(&self, input: &Input<'_>) -> Result<(), Error> {

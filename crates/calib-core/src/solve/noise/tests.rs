@@ -1,5 +1,7 @@
 //! The sums and the score against dense factors.
 
+mod parts;
+
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
 
 use crate::model::layout::Model;
@@ -139,7 +141,7 @@ impl Case {
         let mut h = DMatrix::from_fn(n, n, |i, j| if i == j { self.prior(i) } else { 0.0 });
         let mut sum = 0.0;
         for s in self.dense(theta) {
-            h += s.a.tr_mul(&s.a);
+            s.a.add_gram(1.0, &mut h);
             sum += s.log_det + s.w.norm_squared();
         }
         let cholesky = nalgebra::Cholesky::new(h).unwrap();
@@ -179,9 +181,9 @@ fn score_is_gradient(markers: usize) {
     for (a, b) in own.h.iter().zip(&system.h) {
         assert!((a - b).abs() < 1e-10 * scale);
     }
+    let taken = sums.traces_with(&c);
     for (i, &g) in GROUPS.iter().enumerate() {
-        let taken = sums.moments[i].h.dot(&c);
-        let score = 0.5 * (sums.squares[i] - sums.traces[i] + taken);
+        let score = 0.5 * (sums.squares[i] - sums.traces[i] + taken[i]);
         const STEP: f64 = 1e-4;
         let mut at = |step: f64| {
             let theta = case.scaled(g, step.exp());
@@ -248,8 +250,8 @@ fn equations_are_dense(markers: usize) {
     let n = case.model.free();
     let (mut h, mut g, mut cost) = (DMatrix::zeros(n, n), DVector::zeros(n), 0.0);
     for s in case.dense(&case.theta.clone()) {
-        h += s.a.tr_mul(&s.a);
-        g += s.a.tr_mul(&s.w);
+        s.a.add_gram(1.0, &mut h);
+        s.a.add_transposed_vector(&s.w, &mut g);
         cost += s.w.norm_squared();
     }
     let scale = h.amax();

@@ -1,0 +1,87 @@
+//! L of a positive definite matrix = L Lᵀ, in place.
+
+use std::ops::Range;
+
+use calib_geometry::decompose::dot;
+use nalgebra::DMatrix;
+
+/// Lower Cholesky factor in place (row-major, lower triangle): columns block by block, what earlier blocks take from them as one product.
+pub(crate) fn cholesky_in_place(a: &mut [f64], n: usize) -> bool {
+    /// Columns of a block.
+    const BLOCK: usize = 64;
+    for first in (0..n).step_by(BLOCK) {
+        let end = n.min(first + BLOCK);
+        if first > 0 {
+            take_earlier(a, n, first..end);
+        }
+        for i in first..n {
+            for j in first..end.min(i + 1) {
+                let (ri, rj) = (&a[i * n + first..i * n + j], &a[j * n + first..j * n + j]);
+                let sum = a[i * n + j] - dot(ri, rj);
+                if i == j {
+                    if !(sum > 0.0 && sum.is_finite()) {
+                        return false;
+                    }
+                    a[i * n + i] = sum.sqrt();
+                } else {
+                    a[i * n + j] = sum / a[j * n + j];
+                }
+            }
+        }
+    }
+    true
+}
+
+/// A_ij −= Σ_c L_ic L_jc over the columns before those of a block, for its columns j.
+fn take_earlier(a: &mut [f64], n: usize, block: Range<usize>) {
+    let first = block.start;
+    let mut done = DMatrix::zeros(first, n - first);
+    for (i, mut row) in done.column_iter_mut().enumerate() {
+        let from = (first + i) * n;
+        row.copy_from_slice(&a[from..from + first]);
+    }
+    // The product of a transpose has no fast kernel.
+    let product = done.transpose() * done.columns(0, block.len());
+    for i in first..n {
+        for j in first..block.end.min(i + 1) {
+            a[i * n + j] -= product[(i - first, j - first)];
+        }
+    }
+}
+
+/// y ← (L Lᵀ)⁻¹ y.
+pub(crate) fn solve_in_place(l: &[f64], n: usize, y: &mut [f64]) {
+    for i in 0..n {
+        let sum = dot(&l[i * n..i * n + i], &y[..i]);
+        y[i] = (y[i] - sum) / l[i * n + i];
+    }
+    for i in (0..n).rev() {
+        y[i] /= l[i * n + i];
+        let yi = y[i];
+        for j in 0..i {
+            y[j] -= l[i * n + j] * yi;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Within one block and over several, and a matrix that is not positive definite.
+    #[test]
+    fn a_factor_gives_the_matrix_back() {
+        for n in [1, 63, 64, 65, 150] {
+            let b = DMatrix::from_fn(n, n, |i, k| ((i * 31 + k * 17) as f64).sin());
+            let matrix = &b * b.transpose() + DMatrix::identity(n, n);
+            let mut a: Vec<f64> = matrix.iter().copied().collect();
+            assert!(cholesky_in_place(&mut a, n));
+            let l = DMatrix::from_row_slice(n, n, &a).lower_triangle();
+            assert!((&l * l.transpose() - &matrix).amax() < 1e-12 * n as f64 * matrix.amax());
+            let mut indefinite = matrix;
+            indefinite[(n - 1, n - 1)] = -1.0;
+            let mut a: Vec<f64> = indefinite.iter().copied().collect();
+            assert!(!cholesky_in_place(&mut a, n));
+        }
+    }
+}
