@@ -205,7 +205,8 @@ fn goodness(e: &Evidence<'_>, fit: &MlFit) -> Goodness {
         let stated = stated_sigma(&e.inputs.robot.profile, &n.name).filter(|s| *s > 0.0)?;
         // Of few samples, what is beyond doubt above what is stated.
         let certain = |relative: f64| n.sigma * (-CERTAIN * relative).exp() > stated;
-        let told = n.samples >= ENOUGH || n.relative_error.is_some_and(certain);
+        let few = (n.samples < ENOUGH).then_some(n.samples);
+        let told = few.is_none() || n.relative_error.is_some_and(certain);
         let known = n.estimated && told && n.kind != NoiseKind::Scale;
         known.then(|| FoundNoise {
             group: n.name.clone(),
@@ -214,6 +215,7 @@ fn goodness(e: &Evidence<'_>, fit: &MlFit) -> Goodness {
             rigid: rigid_of(&n.name)
                 .filter(|_| n.kind == NoiseKind::Position)
                 .map(|sigma| sigma / stated),
+            few,
         })
     });
     let beside: Vec<FoundNoise> = beside.collect();

@@ -48,10 +48,13 @@ pub(crate) fn dh_table(inputs: &Inputs, fit: &MlFit) -> Option<DhTable> {
         let gradient = &gradients[i];
         let variance = (&fit.solution.information.covariance * gradient).dot(gradient);
         // What no free parameter moves was held: nothing is known of its error.
-        let sigma = Some(variance.max(0.0).sqrt()).filter(|s| s.is_finite() && *s > 0.0);
+        let sigma = Some(variance.max(0.0).sqrt()).filter(|s| s.is_finite() && *s > ROUNDING);
         (sigma, measured(fit, gradient))
     }))
 }
+
+/// A standard deviation below this, rad or m, is what rounding leaves of none.
+const ROUNDING: f64 = 1e-12;
 
 /// The numbers of all rows, one after the other.
 fn numbers(chain: &DhChain) -> Vec<(DhParameter, f64)> {

@@ -365,4 +365,6 @@ pub struct FoundNoise {
     pub of_rows: f64,
     /// Scatter of the markers about their own rigid bodies over the stated noise: no model of the robot is in it.
     pub rigid: Option<f64>,
+    /// Number of samples, where they are so few that a wrong reading may be in them without a name.
+    pub few: Option<usize>,
 }

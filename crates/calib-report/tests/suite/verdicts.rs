@@ -54,6 +54,7 @@ fn found(factor: f64, rigid: Option<f64>) -> FoundNoise {
         factor,
         of_rows: factor,
         rigid,
+        few: None,
     }
 }
 
@@ -484,6 +485,18 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
             Warns,
             with(|f| {
                 f.goodness.as_mut().expect("there").above_stated = Some(found(2.5, Some(2.4)));
+            }),
+        ),
+        (
+            ReasonId::NoiseAboveStated,
+            Warns,
+            with(|f| {
+                let few = Some(9);
+                let found = FoundNoise {
+                    few,
+                    ..found(2.5, None)
+                };
+                f.goodness.as_mut().expect("there").above_stated = Some(found);
             }),
         ),
         (

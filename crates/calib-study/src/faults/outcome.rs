@@ -175,11 +175,14 @@ impl CaseResult {
             ReasonId::NoiseAboveStated,
             ReasonId::NoiseBelowStated,
         ];
+        // Of so few poses it says that a reading may be wrong, and one is.
+        let wrong_reading = |id: &ReasonId| outliers && few && *id == ReasonId::NoiseAboveStated;
+        let untrue_of_model = |id: &ReasonId| about_the_model.contains(id) && !wrong_reading(id);
         let worse = self.reasons.contains(&ReasonId::WorseThanRegistration);
         self.cell.fault.class() == Class::Clean
             && (self.findings.iter().any(untrue)
                 || (worse && !self.truly_worse())
-                || self.reasons.iter().any(|id| about_the_model.contains(id)))
+                || self.reasons.iter().any(untrue_of_model))
     }
 }
 

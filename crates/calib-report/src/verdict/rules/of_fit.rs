@@ -123,6 +123,7 @@ pub(super) fn stated_noise(facts: &Facts) -> Vec<Reason> {
         let rigid = found.rigid.filter(|rigid| *rigid > EXPLAINS * found.factor);
         reason(ReasonId::NoiseAboveStated, found, found.factor)
             .with_some("rigid", rigid.map(Fact::ratio))
+            .with_some("samples", found.few.map(Fact::count))
     });
     let below = goodness.below_stated.as_ref();
     let below = below.filter(|found| found.of_rows < BELOW_STATED);
