@@ -211,7 +211,7 @@ fn of_fit(reason: &Reason, v: &Values<'_>) -> String {
             "The estimated noise of {} is {} times the stated noise, from {} samples only: the model is incomplete, or a reading is wrong. The reported uncertainty includes the excess.",
             v.name("group"),
             v.number("factor"),
-            v.number("samples")
+            v.count("samples")
         ),
         ReasonId::NoiseAboveStated => format!(
             "The estimated noise of {} is {} times the stated noise: the model is incomplete. The reported uncertainty includes the excess.",

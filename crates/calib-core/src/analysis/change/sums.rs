@@ -9,6 +9,8 @@ use crate::solve::normal::add_prior;
 use crate::solve::parted::Parted;
 use crate::solve::whitened::{Whitened, covariance_of, whitened};
 
+mod others;
+
 /// Fewest samples on either side of a step: one or two bad poses are outliers, not a change.
 pub(super) const LEAST: usize = 3;
 
@@ -354,6 +356,10 @@ impl Design {
         let other = |o: &usize| between(self.parts[*o], self.parts[o + 1]);
         let inside =
             between(after.first, after.end) + after.others.iter().map(other).sum::<usize>();
+        self.is_enough(inside)
+    }
+
+    fn is_enough(&self, inside: usize) -> bool {
         inside >= LEAST && self.places[self.places.len() - 1] - inside >= LEAST
     }
 
@@ -361,8 +367,8 @@ impl Design {
         let sums = &self.cumulative[candidate];
         let mut out = Sum::zeros(sums[0].e.nrows(), sums[0].e.ncols());
         out.add_between(&sums[after.first], &sums[after.end]);
-        for o in &after.others {
-            out.add_between(&sums[self.parts[*o]], &sums[self.parts[o + 1]]);
+        for (from, to) in self.runs(after) {
+            out.add_between(&sums[from], &sums[to]);
         }
         out
     }
@@ -375,20 +381,24 @@ impl Design {
 
     fn set_u_of(&self, u: &[DVector<f64>], after: &After, out: &mut DVector<f64>) {
         u[after.end].sub_to(&u[after.first], out);
-        for o in &after.others {
-            *out += &u[self.parts[o + 1]];
-            *out -= &u[self.parts[*o]];
+        for (from, to) in self.runs(after) {
+            *out += &u[to];
+            *out -= &u[from];
         }
     }
 
     /// I of equation (1), inverted; `None` where it is not positive.
     fn inverse(&self, candidate: usize, after: &After) -> Option<DMatrix<f64>> {
-        let sum = self.sum(candidate, after);
+        let information = self.information(candidate, &self.sum(candidate, after));
+        Some(Cholesky::new(information)?.inverse())
+    }
+
+    fn information(&self, candidate: usize, sum: &Sum) -> DMatrix<f64> {
         let mut information = &sum.g - sum.e.tr_mul(&sum.ce);
         for i in 0..information.nrows() {
             information[(i, i)] += self.wide[candidate];
         }
-        Some(Cholesky::new(information)?.inverse())
+        information
     }
 
     pub(super) fn tests(&self, candidate: usize) -> Vec<Test> {
@@ -421,38 +431,11 @@ impl Design {
                 *best = Some((gain, test));
             }
         }
-        let found = of_part.into_iter().flatten().filter_map(|(_, test)| {
-            let first = found(&test.after, &test.inverse, &self.u_of(u, &test.after));
-            self.extended(candidate, first, u)
-        });
-        found.max_by(|a, b| a.gain.total_cmp(&b.gain))
-    }
-
-    fn extended(&self, candidate: usize, mut best: Found, u: &[DVector<f64>]) -> Option<Found> {
-        if self.patterns[candidate] != Pattern::Step {
-            return Some(best);
-        }
-        loop {
-            let toggled = (0..self.parts.len() - 1)
-                .filter(|o| *o != best.after.part)
-                .map(|o| {
-                    let mut after = best.after.clone();
-                    match after.others.iter().position(|x| *x == o) {
-                        Some(at) => drop(after.others.remove(at)),
-                        None => after.others.push(o),
-                    }
-                    after
-                });
-            let better = toggled
-                .filter(|after| self.is_large_enough(after))
-                .filter_map(|after| self.tested(candidate, &after, u))
-                .max_by(|a, b| a.gain.total_cmp(&b.gain));
-            match better {
-                // More than rounding, so that the loop ends.
-                Some(next) if next.gain > best.gain * (1.0 + 1e-9) => best = next,
-                _ => return Some(best),
-            }
-        }
+        let firsts = of_part
+            .into_iter()
+            .flatten()
+            .map(|(_, test)| found(&test.after, &test.inverse, &self.u_of(u, &test.after)));
+        self.beside_others(candidate, firsts.collect(), u)
     }
 
     /// The best change near that of a coarser design, with the same other recordings.
