@@ -263,6 +263,38 @@ fn a_change_is_named_with_its_row() {
     }
 }
 
+/// A hundred postures in 25 files: what moved is named at its row, and with the files behind it.
+#[test]
+fn of_many_recordings_those_behind_a_change_are_found() {
+    const EACH: usize = 4;
+    let mut settings = ChangeSettings::default();
+    settings.borders = (1..25).map(|file| EACH * file).collect();
+    let scan = |case: &Case| case.solution.changes(&settings).expect("evaluable");
+    let mut clean = 0;
+    for seed in 0..8 {
+        let nothing = case(seed, Design::Random(100), Event::Nothing);
+        clean += usize::from(scan(&nothing).significant().is_some());
+        let case = case(seed, Design::Random(100), Event::Slip(1.5 * TWO));
+        let found = scan(&case);
+        let change = found.significant().expect("a change");
+        assert_eq!(change.moved, Moved::Body(case.h.body), "seed {seed}");
+        // A change between two files is in no file: the files behind it say where it is.
+        let earliest = change.also.iter().fold(change.first, |a, b| a.min(*b));
+        assert!(earliest.abs_diff(case.row) <= 1, "seed {seed}");
+        // A file next to the row, or one of four poses that do not show on which side they are, may be on the other side.
+        let behind = |first: &&usize| **first > case.row + EACH;
+        let expected = settings.borders.iter().filter(behind).count();
+        let right = change.also.iter().filter(behind).count();
+        assert!(right + 1 >= expected, "seed {seed}: {right} of {expected}");
+        assert!(
+            change.also.len() <= right + 3,
+            "seed {seed}: {:?}",
+            change.also
+        );
+    }
+    assert!(clean <= 1, "{clean}");
+}
+
 /// The robust fit rejects the last eight rows, which are those after the change.
 #[test]
 fn a_change_whose_rows_were_rejected_is_named() {
