@@ -319,7 +319,7 @@ pub fn square_root(a: &DMatrix<f64>) -> DMatrix<f64> {
     let mut rank = 0;
     while rank < n {
         let largest = (0..n).fold(0, |best, i| if left[i] > left[best] { i } else { best });
-        if !(left[largest] > nothing) {
+        if left[largest] <= nothing || left[largest].is_nan() {
             break;
         }
         // h = (A e_p − H Hᵀe_p) / √(A_pp − |Hᵀe_p|²)

@@ -29,7 +29,7 @@ fn data() -> Data {
         let marker = |i: usize, m: usize| {
             let at = 7 * i + 300 * m + 100 * b;
             let place = Point3::new(drawn(at), drawn(at + 1), drawn(at + 2));
-            (at % 5 != 0).then_some(place)
+            (!at.is_multiple_of(5)).then_some(place)
         };
         let markers = (0..rows).map(|i| (0..2).map(|m| marker(i, m)).collect());
         Body {
