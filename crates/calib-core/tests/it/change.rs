@@ -295,6 +295,18 @@ fn of_many_recordings_those_behind_a_change_are_found() {
     assert!(clean <= 1, "{clean}");
 }
 
+/// More files than samples that are simulated: which of them fit the other side better is chance.
+#[test]
+fn in_many_recordings_chance_is_no_change() {
+    let mut settings = ChangeSettings::default();
+    settings.borders = (1..300).map(|file| 2 * file).collect();
+    for seed in 0..2 {
+        let case = case(seed, Design::Random(600), Event::Nothing);
+        let scan = case.solution.changes(&settings).expect("evaluable");
+        assert_eq!(scan.significant(), None, "seed {seed}");
+    }
+}
+
 /// The robust fit rejects the last eight rows, which are those after the change.
 #[test]
 fn a_change_whose_rows_were_rejected_is_named() {

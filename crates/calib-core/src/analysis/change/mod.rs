@@ -29,6 +29,8 @@ mod levels;
 mod scatter;
 mod sums;
 
+use std::collections::BTreeSet;
+
 use serde::{Deserialize, Serialize};
 
 use crate::analysis::solution::Solution;
@@ -254,7 +256,7 @@ impl Solution {
         if used.len() < 2 * LEAST || candidates.list.is_empty() {
             return None;
         }
-        let thin = every(&used, used.len().div_ceil(SIMULATED));
+        let thin = thinned(&used, borders);
         let stride = used.len().div_ceil(EDGES);
         let edges = every(&used, stride);
         let levels = Levels::new(self, &candidates, &used, &edges, borders)?;
@@ -313,6 +315,17 @@ fn mostly<'a>(rejected: impl Iterator<Item = &'a bool>) -> bool {
     false
 }
 
+/// Samples that are simulated in place of all: every recording has one, for what other recordings on the other side gain by chance grows with
+/// their number, not with that of their samples.
+fn thinned(used: &[usize], borders: &[usize]) -> Vec<usize> {
+    let recording = |sample: &usize| borders.partition_point(|b| b <= sample);
+    let mut out = every(used, used.len().div_ceil(SIMULATED));
+    let mut seen: BTreeSet<usize> = out.iter().map(recording).collect();
+    out.extend(used.iter().filter(|s| seen.insert(recording(s))));
+    out.sort_unstable();
+    out
+}
+
 fn every(samples: &[usize], stride: usize) -> Vec<usize> {
     samples.iter().step_by(stride).copied().collect()
 }
@@ -336,5 +349,28 @@ fn change(moved: Moved, best: &Best, design: &Design, quantile: f64) -> Change {
             .iter()
             .map(|v| (v * s2.max(0.0)).sqrt())
             .collect(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::thinned;
+
+    /// 100 recordings of 2 and 200 of 9 samples, of which some were not used.
+    #[test]
+    fn every_recording_is_simulated() {
+        let starts: Vec<usize> = (0..100).map(|r| 2 * r).collect();
+        let mut borders = starts[1..].to_vec();
+        borders.extend((0..200).map(|r| 200 + 9 * r));
+        let used: Vec<usize> = (0..2000).filter(|s| s % 9 != 4).collect();
+        let recording = |s: &usize| borders.partition_point(|b| b <= s);
+        let all: Vec<usize> = used.iter().map(recording).collect();
+        let mut simulated: Vec<usize> = thinned(&used, &borders).iter().map(recording).collect();
+        simulated.dedup();
+        let mut expected = all;
+        expected.dedup();
+        assert_eq!(simulated, expected);
+        // Where every recording has one already, nothing is added.
+        assert_eq!(thinned(&used[..240], &[100]), used[..240]);
     }
 }

@@ -183,7 +183,7 @@ impl Design {
         samples: &[usize],
     ) -> Option<()> {
         // Few enough to be simulated.
-        let keep = samples.len() <= SIMULATED;
+        let keep = samples.len() <= SIMULATED + self.parts.len();
         let model = &solution.model;
         let n = model.free();
         let mut work = Workspace::new(model);
