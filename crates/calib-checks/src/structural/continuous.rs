@@ -83,8 +83,10 @@ pub(crate) fn continuous(
     screened: &[SampleIndex],
     options: &Options,
 ) -> Option<Continuous> {
-    let beside = confirmed(data, screened, options);
-    let all = (!screened.is_empty()).then(|| confirmed(data, &[], options));
+    let (beside, all) = rayon::join(
+        || confirmed(data, screened, options),
+        || (!screened.is_empty()).then(|| confirmed(data, &[], options)),
+    );
     let scale = |found: &Continuous| {
         let left = left_with(data, screened, Some(&found.hypothesis), options);
         left.map_or(f64::INFINITY, |left| left.scale)
@@ -127,8 +129,10 @@ fn outliers(
     fault: &Hypothesis,
     options: &Options,
 ) -> Vec<SampleIndex> {
-    let with = left_with(data, screened, Some(fault), options);
-    let without = left_with(data, screened, None, options);
+    let (with, without) = rayon::join(
+        || left_with(data, screened, Some(fault), options),
+        || left_with(data, screened, None, options),
+    );
     let least = [without, with].into_iter().flatten();
     let least = least.min_by(|a, b| a.scale.total_cmp(&b.scale));
     least.map(|found| found.samples).unwrap_or_default()

@@ -1,5 +1,7 @@
 //! The decision: rank, screen, name, verify.
 
+use rayon::prelude::*;
+
 use super::apply::{apply, apply_all};
 use super::candidates::{Candidate, candidates, span};
 use super::continuous;
@@ -15,7 +17,7 @@ use super::outcome::{Correction, Decision, Design, Evidence, Named, Options, Out
 use super::ranking::{Ranking, distinct, few_samples, ratio};
 use super::readings::{WrongReadings, wrong_readings};
 use super::scan::{Scan, Score, Scored};
-use super::screen::screen;
+use super::screen::{Screened, screen};
 use super::thinning::thinned;
 use super::twin::twin;
 
@@ -74,10 +76,6 @@ pub fn explain(data: &Data, options: &Options) -> Result<Outcome, DataError> {
     }
     let (ranking, screened) = screened_ranking(work, &candidates);
     outcome.rms = ranking.none.rms;
-    outcome.expected = expected(work, &screened, options);
-    if options.list_invisible {
-        outcome.invisible = invisible(work, &ranking, &screened, options);
-    }
     let asked = Asked {
         data: work,
         candidates: &candidates,
@@ -85,19 +83,19 @@ pub fn explain(data: &Data, options: &Options) -> Result<Outcome, DataError> {
         screened: &screened,
         options,
     };
-    outcome.decision = decide(&asked, &outcome);
-    let correction = match &outcome.decision {
-        Decision::Named(named)
-        | Decision::Undecided {
-            leading: Some(named),
-            ..
-        } => named.correction.clone(),
-        _ => Vec::new(),
+    let continuous_of = |data: &Data| match options.score_tests {
+        true => continuous::continuous(data, &screened, options),
+        false => None,
     };
-    if options.score_tests {
-        outcome.continuous =
-            continuous::continuous(&apply_all(&correction, work), &screened, options);
-    }
+    // Most data need no correction: the tests do not wait for the decision.
+    let (correction, as_they_are) = rayon::join(
+        || decided(&asked, &mut outcome),
+        || continuous_of(work),
+    );
+    outcome.continuous = match correction.is_empty() {
+        true => as_they_are,
+        false => continuous_of(&apply_all(&correction, work)),
+    };
     let original = |s: &SampleIndex| SampleIndex {
         row: rows[s.row],
         ..*s
@@ -105,6 +103,30 @@ pub fn explain(data: &Data, options: &Options) -> Result<Outcome, DataError> {
     outcome.screened = screened.iter().map(original).collect();
     beyond_hypotheses(data, (work, &screened), &mut outcome, options);
     Ok(outcome)
+}
+
+/// Decides, with the residual that nominal errors explain and what the data cannot show; the correction of the hypothesis that is named or leads.
+fn decided(asked: &Asked<'_>, outcome: &mut Outcome) -> Correction {
+    let Asked {
+        data,
+        ranking,
+        screened,
+        options,
+        ..
+    } = *asked;
+    outcome.expected = expected(data, screened, options);
+    if options.list_invisible {
+        outcome.invisible = invisible(data, ranking, screened, options);
+    }
+    outcome.decision = decide(asked, outcome);
+    match &outcome.decision {
+        Decision::Named(named)
+        | Decision::Undecided {
+            leading: Some(named),
+            ..
+        } => named.correction.clone(),
+        _ => Vec::new(),
+    }
 }
 
 /// What no hypothesis of the list says: a change at one row, or a column that is wrong in a way of its own. `work` and `screened`:
@@ -193,9 +215,12 @@ fn screened_ranking(data: &Data, candidates: &[Candidate]) -> (Ranking, Vec<Samp
     for _ in 0..SCREENINGS {
         let mut leaders: Vec<Correction> = vec![Vec::new()];
         leaders.extend(distinct(&ranking.scored, SCREENED_LEADERS).map(|s| vec![s.scoped]));
-        let found = leaders
-            .iter()
+        let found: Vec<Screened> = leaders
+            .par_iter()
             .map(|leader| screen(data, leader))
+            .collect();
+        let found = found
+            .into_iter()
             .min_by(|a, b| a.scale.total_cmp(&b.scale));
         let Some(found) = found.filter(|f| f.matters && f.samples != screened) else {
             break;

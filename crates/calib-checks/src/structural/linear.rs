@@ -3,8 +3,10 @@
 //! Equations: [`continuous`](super::continuous).
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
+use rayon::prelude::*;
 
 use super::Options;
 use super::chain::{Motion, Pose, Walk};
@@ -19,6 +21,9 @@ use super::whitened::{JointNoise, Tall, Whitened};
 const LEAST_SIGMA: f64 = 3e-5;
 /// Ridge relative to the largest diagonal entry: the mount and the registration share directions.
 const RIDGE: f64 = 1e-10;
+/// Rows that are summed one after the other, and how many such sums are held at once: they make the same bits on any number of cores.
+const PIECE: usize = 60;
+const AT_ONCE: usize = 16;
 
 /// The linear model at one point of linearization: sums over the rows.
 pub(crate) struct Model<'a> {
@@ -197,17 +202,37 @@ impl<'a> Model<'a> {
             log_det: 0.0,
             observations: 0.0,
         });
-        for group in groups(self) {
-            let own = self.sums_of_group(&group, lambdas);
-            for (all, own) in out.iter_mut().zip(own) {
-                all.add(&own, &group.columns);
+        let rows = self.scan.data.readings.len();
+        let groups = groups(self);
+        let pieces: Vec<(&Group, Range<usize>)> = groups
+            .iter()
+            .flat_map(|group| {
+                let firsts = (0..rows).step_by(PIECE);
+                firsts.map(move |first| (group, first..rows.min(first + PIECE)))
+            })
+            .collect();
+        // A few at a time, for every sum is as large as all together.
+        for some in pieces.chunks(AT_ONCE) {
+            let sums: Vec<[Sums; N]> = some
+                .par_iter()
+                .map(|(group, rows)| self.sums_of_group(group, rows.clone(), lambdas))
+                .collect();
+            for ((group, _), own) in some.iter().zip(sums) {
+                for (all, own) in out.iter_mut().zip(own) {
+                    all.add(&own, &group.columns);
+                }
             }
         }
         out
     }
 
-    /// Those over the rows of a group, over its columns.
-    fn sums_of_group<const N: usize>(&self, group: &Group, lambdas: [f64; N]) -> [Sums; N] {
+    /// Those of some rows of a group, over its columns.
+    fn sums_of_group<const N: usize>(
+        &self,
+        group: &Group,
+        rows: Range<usize>,
+        lambdas: [f64; N],
+    ) -> [Sums; N] {
         let width = group.columns.len() + 1;
         let mut white = Tall::new(width);
         let mut out = lambdas.map(|lambda| {
@@ -218,7 +243,7 @@ impl<'a> Model<'a> {
         let data = self.scan.data;
         let links: Vec<LinkIndex> = group.bodies.iter().map(|&b| data.bodies[b].link).collect();
         let mut walk = Walk::new(&data.chain, &links);
-        for i in 0..data.readings.len() {
+        for i in rows {
             let of_row = i * self.scan.channels.len();
             let kept = group.channels.iter().copied();
             let seen: Vec<usize> = kept

@@ -21,6 +21,7 @@
 //! joint values are equal; merge them before.
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use crate::analysis::solution::{Solution, describe_parameters};
 use crate::graph::measurement::MeasurementKind;
@@ -29,7 +30,7 @@ use crate::solve::whitened::{covariance_of, whitened};
 
 mod scaled;
 
-use scaled::{Keys, Scaled, scaled_sample};
+use scaled::{Keys, Scaled, Unnumbered, scaled_sample};
 
 /// Which rows have the memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -78,6 +79,9 @@ impl Dependence {
 
 /// Samples that the memory is estimated from at most.
 const SAMPLES: usize = 1500;
+/// Samples that are looked at one after the other, and those that are held at once.
+const TOGETHER: usize = 16;
+const AT_ONCE: usize = 8 * TOGETHER;
 /// Lags that it is estimated from.
 const LAGS: usize = 3;
 /// Strongest memory that is distinguishable from a constant error.
@@ -206,17 +210,26 @@ impl Solution {
     fn each_scaled(&self, of: MemoryOf, borders: &[usize], mut see: impl FnMut(Scaled) -> bool) {
         let mut work = Workspace::new(&self.model);
         work.cache.update(&self.model.problem, &self.values);
+        let of_some = |some: &[usize]| -> Vec<(usize, Unnumbered)> {
+            let mut work = work.clone();
+            let rows = some.iter().filter_map(|&sample| {
+                let rows = whitened(self.objective(), &self.values, sample, &mut work)?;
+                Some((sample, scaled_sample(self, &rows, of)))
+            });
+            rows.collect()
+        };
         let mut keys = Keys::default();
         let mut recording = None;
-        for sample in 0..self.model.problem.samples {
-            let Some(rows) = whitened(self.objective(), &self.values, sample, &mut work) else {
-                continue;
-            };
-            let own = borders.partition_point(|b| *b <= sample);
-            let starts = recording != Some(own);
-            recording = Some(own);
-            if !see(scaled_sample(self, &rows, of, starts, &mut keys)) {
-                break;
+        let samples: Vec<usize> = (0..self.model.problem.samples).collect();
+        for some in samples.chunks(AT_ONCE) {
+            let pieces: Vec<_> = some.par_chunks(TOGETHER).map(of_some).collect();
+            for (sample, rows) in pieces.into_iter().flatten() {
+                let own = borders.partition_point(|b| *b <= sample);
+                let starts = recording != Some(own);
+                recording = Some(own);
+                if !see(rows.numbered(starts, &mut keys)) {
+                    return;
+                }
             }
         }
     }
@@ -355,13 +368,13 @@ fn bias(samples: &[Scaled], c: &DMatrix<f64>, share: f64, decay: f64) -> [f64; L
     // Rows are columns of the transposed matrices, which lie side by side in memory.
     let k: Vec<DMatrix<f64>> = samples.iter().map(|s| s.k.transpose()).collect();
     let h: Vec<DMatrix<f64>> = samples
-        .iter()
+        .par_iter()
         .zip(&around)
         .map(|(s, n_s)| (&s.k + &s.w * n_s).transpose())
         .collect();
     let times = |right: &DMatrix<f64>| -> Vec<DMatrix<f64>> {
         let product = |s: &Scaled| (&s.k * right).transpose();
-        samples.iter().map(product).collect()
+        samples.par_iter().map(product).collect()
     };
     let (kc, kg) = (times(c), times(&covariance));
     let mut out = [0.0; LAGS + 1];
@@ -383,7 +396,7 @@ fn bias(samples: &[Scaled], c: &DMatrix<f64>, share: f64, decay: f64) -> [f64; L
 
 /// The same without memory: −tr(k_s C k_tᵀ).
 fn bias_of_none(samples: &[Scaled], c: &DMatrix<f64>) -> [f64; LAGS + 1] {
-    let kc: Vec<DMatrix<f64>> = samples.iter().map(|s| &s.k * c).collect();
+    let kc: Vec<DMatrix<f64>> = samples.par_iter().map(|s| &s.k * c).collect();
     let mut out = [0.0; LAGS + 1];
     for (s, a) in samples.iter().enumerate() {
         for lag in 0..=LAGS {

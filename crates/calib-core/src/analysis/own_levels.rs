@@ -169,7 +169,8 @@ impl Solution {
         let found = refit(&own.problem, start, settings).ok()?;
         let step = self.model.problem().samples().div_ceil(POSES).max(1);
         let left_out = |of: &Self| of.leave_out(|sample| sample.is_multiple_of(step));
-        let (own, common) = (left_out(&found)?, left_out(self)?);
+        let (own, common) = rayon::join(|| left_out(&found), || left_out(self));
+        let (own, common) = (own?, common?);
         let scores = Scores::of(&[&own, &common]);
         let (less, error) = paired(&scores.surprises[1], &scores.surprises[0]);
         let ratio = (mean(&scores.squares[0]) / mean(&scores.squares[1])).sqrt();

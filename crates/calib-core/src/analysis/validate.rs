@@ -10,6 +10,7 @@
 //! Equation (1) is exact for a linear model and equals refits to second order in the residuals otherwise.
 
 use std::collections::BTreeSet;
+use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -19,10 +20,12 @@ use crate::graph::ids::MeasurementId;
 use crate::graph::problem::NoiseKind;
 use crate::model::layout::{Model, Observation};
 use crate::model::values::Values;
+use crate::solve::cholesky::{cholesky_in_place, solve_in_place};
+use crate::solve::chunks::chunked;
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::normal::accumulate;
 use crate::solve::rows::add_block;
-use crate::solve::whitened::{covariance_of, whitened};
+use crate::solve::whitened::{Whitened, covariance_of, lower_inverse, whitened};
 
 /// Prediction of one sample from the others.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -270,38 +273,59 @@ pub(crate) fn predictions(
         weights: include,
         ..objective
     };
+    let samples = 0..model.problem.samples;
+    let samples: Vec<usize> = samples.filter(|sample| wanted(*sample)).collect();
+    let of = |some: Range<usize>| {
+        let mut work = Workspace::with(model, work.cache.clone());
+        let some = samples[some].iter();
+        let seen = some.filter_map(|&s| Some((s, whitened(included, values, s, &mut work)?)));
+        let each = seen.map(|(sample, s)| prediction(model, sample, &s, &c, left_out));
+        Some(each.collect::<Vec<_>>())
+    };
     let mut out = CrossValidation::default();
-    for sample in (0..model.problem.samples).filter(|sample| wanted(*sample)) {
-        let Some(s) = whitened(included, values, sample, &mut work) else {
-            continue;
-        };
-        let m = s.w.len();
-        let (_, q) = s.a.between(&c);
-        let with_all = &s.l * (DMatrix::identity(m, m) + &q);
-        let Some(predicted) = Predicted::new(q, &s.w, left_out) else {
-            out.indispensable.push(sample);
-            continue;
-        };
-        let log_det = s.log_det + predicted.log_det;
-        let z2 = predicted.z2;
-        let e = &s.l * &predicted.error;
-        let own = &s.l * predicted.covariance;
-        let vector = |&(observation, first, rows): &(usize, usize, usize)| {
-            let l = s.l.rows(first, rows);
-            let covariance = own.rows(first, rows) * l.transpose();
-            let variances = (first..first + rows).map(|i| with_all.row(i).dot(&s.l.row(i)));
-            let error = e.rows(first, rows).into_owned();
-            vector_error(model, observation, error, covariance, variances.collect())
-        };
-        out.samples.push(SamplePrediction {
-            sample,
-            vectors: s.blocks.iter().map(vector).collect(),
-            z2,
-            rows: m,
-            log_density: -0.5 * (z2 + log_det + m as f64 * (2.0 * std::f64::consts::PI).ln()),
-        });
-    }
+    chunked(samples.len(), of, |some| {
+        for predicted in some {
+            match predicted {
+                Ok(predicted) => out.samples.push(predicted),
+                Err(Indispensable(sample)) => out.indispensable.push(sample),
+            }
+        }
+    })?;
     Some(out)
+}
+
+/// A sample without which something would be undetermined.
+struct Indispensable(usize);
+
+fn prediction(
+    model: &Model,
+    sample: usize,
+    s: &Whitened,
+    c: &DMatrix<f64>,
+    left_out: bool,
+) -> Result<SamplePrediction, Indispensable> {
+    let m = s.w.len();
+    let (_, q) = s.a.between(c);
+    let with_all = &s.l * (DMatrix::identity(m, m) + &q);
+    let predicted = Predicted::new(q, &s.w, left_out).ok_or(Indispensable(sample))?;
+    let log_det = s.log_det + predicted.log_det;
+    let z2 = predicted.z2;
+    let e = &s.l * &predicted.error;
+    let own = &s.l * predicted.covariance;
+    let vector = |&(observation, first, rows): &(usize, usize, usize)| {
+        let l = s.l.rows(first, rows);
+        let covariance = own.rows(first, rows) * l.transpose();
+        let variances = (first..first + rows).map(|i| with_all.row(i).dot(&s.l.row(i)));
+        let error = e.rows(first, rows).into_owned();
+        vector_error(model, observation, error, covariance, variances.collect())
+    };
+    Ok(SamplePrediction {
+        sample,
+        vectors: s.blocks.iter().map(vector).collect(),
+        z2,
+        rows: m,
+        log_density: -0.5 * (z2 + log_det + m as f64 * (2.0 * std::f64::consts::PI).ln()),
+    })
 }
 
 /// The whitened prediction error of a sample: e, its covariance P, eᵀP⁻¹e and log det P.
@@ -317,27 +341,35 @@ impl Predicted {
     /// determines something.
     fn new(q: DMatrix<f64>, w: &DVector<f64>, left_out: bool) -> Option<Self> {
         let m = w.len();
-        let identity = DMatrix::identity(m, m);
-        let factor = nalgebra::Cholesky::new(if left_out { identity - q } else { identity + q })?;
-        let log_det = 2.0 * factor.l_dirty().diagonal().map(f64::ln).sum();
-        let inverse_error = factor.solve(w);
-        let z2 = w.dot(&inverse_error);
+        let p = match left_out {
+            true => DMatrix::identity(m, m) - q,
+            false => DMatrix::identity(m, m) + q,
+        };
+        let mut l = p.as_slice().to_vec();
+        if !cholesky_in_place(&mut l, m) {
+            return None;
+        }
+        let log_det = (0..m).map(|i| 2.0 * l[i * m + i].ln()).sum::<f64>();
         if !left_out {
-            let l = factor.l();
+            let mut solved = w.clone();
+            solve_in_place(&l, m, solved.as_mut_slice());
             return Some(Self {
+                z2: w.dot(&solved),
                 error: w.clone(),
-                covariance: &l * l.transpose(),
-                z2,
+                covariance: p,
                 log_det,
             });
         }
-        let covariance = factor.inverse();
+        // Row after row of L⁻¹ is column after column of its transpose.
+        let transposed = DMatrix::from_vec(m, m, lower_inverse(&l, m));
+        let covariance = &transposed * transposed.transpose();
         // The least eigenvalue of I − Q is at least 1/tr P, and at most m times that.
         let left = 1.0 / covariance.trace();
+        let error = &covariance * w;
         (left >= LEVERAGE_LEFT).then_some(Self {
-            error: inverse_error,
+            z2: w.dot(&error),
+            error,
             covariance,
-            z2,
             log_det: -log_det,
         })
     }

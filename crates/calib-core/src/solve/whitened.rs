@@ -4,7 +4,7 @@
 //! V_s = L Lᵀ,   A_s = L⁻¹ J_s,   w_s = L⁻¹ e_s,   C = H⁻¹                                     (1)
 //! ```
 
-use nalgebra::{DMatrix, DMatrixView, DVector};
+use nalgebra::{DMatrix, DVector};
 
 use crate::model::cache::State;
 use crate::model::path::Derivatives;
@@ -16,6 +16,13 @@ use crate::solve::rows::SampleRows;
 
 /// C of equation (1), (H + tiny ridge)⁻¹: directions that nothing determines have A v = 0 and do not matter in A C Aᵀ.
 pub(crate) fn covariance_of(system: &NormalEquations) -> Option<DMatrix<f64>> {
+    let root = root_of(system)?;
+    let transposed = root.transpose();
+    Some(root * transposed)
+}
+
+/// T of C = T Tᵀ, upper triangular.
+pub(crate) fn root_of(system: &NormalEquations) -> Option<DMatrix<f64>> {
     /// Relative ridge: far below any direction that influences a prediction.
     const RIDGE: f64 = 1e-11;
     let n = system.n;
@@ -44,13 +51,12 @@ pub(crate) fn covariance_of(system: &NormalEquations) -> Option<DMatrix<f64>> {
             l[i * n + i] = 1.0 + ridge;
         }
     }
-    // C = S L⁻ᵀ L⁻¹ S; row after row of L⁻¹ is column after column of its transpose.
+    // T = S L⁻ᵀ; row after row of L⁻¹ is column after column of its transpose.
     let mut inverse = lower_inverse(&l, n);
     for row in inverse.chunks_exact_mut(n.max(1)) {
         row.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);
     }
-    let transposed = DMatrixView::from_slice(&inverse, n, n);
-    Some(transposed * transposed.transpose())
+    Some(DMatrix::from_vec(n, n, inverse))
 }
 
 /// L⁻¹ of a lower triangular L, both row by row.

@@ -32,9 +32,19 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
     let profile = &e.inputs.robot.profile;
     let file = &e.inputs.robot.file;
     let goodness = e.causes.goodness.as_ref();
-    let (workspace, weak) = rayon::join(
-        || e.fit.and_then(|fit| workspace(e.inputs, fit)),
-        || e.fit.and_then(|fit| weak_directions(e.inputs, fit)),
+    let ((workspace, weak), (information, dh_table)) = rayon::join(
+        || {
+            rayon::join(
+                || e.fit.and_then(|fit| workspace(e.inputs, fit)),
+                || e.fit.and_then(|fit| weak_directions(e.inputs, fit)),
+            )
+        },
+        || {
+            rayon::join(
+                || e.fit.map(|fit| data_information(e.inputs, fit)),
+                || e.fit.and_then(|fit| dh_table(e.inputs, fit)),
+            )
+        },
     );
     let missing: Vec<MissingPhysics> = goodness
         .iter()
@@ -54,7 +64,6 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
     let verdict = judgment.verdict;
     let parameters = e.fit.map_or_else(Vec::new, parameters);
     let scope = scope(e, &motions);
-    let information = e.fit.map(|fit| data_information(e.inputs, fit));
     let report = Report {
         profile: file.clone(),
         robot: profile.robot.clone(),
@@ -76,7 +85,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
             .fit
             .zip(information.as_ref())
             .map_or_else(Vec::new, |(fit, of)| robot_changes(e.inputs, fit, of)),
-        dh_table: e.fit.and_then(|fit| dh_table(e.inputs, fit)),
+        dh_table,
         changes: e.urdf.changes.clone(),
         urdf_diff: e.urdf.diff.clone(),
         not_observable: e.fit.map_or_else(Vec::new, not_observable),

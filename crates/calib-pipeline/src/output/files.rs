@@ -39,6 +39,20 @@ pub(crate) fn written(
     let urdf = robots.urdf;
     let mut record = calib_report::json::exact_json(&urdf.record)?;
     record.push('\n');
+    let ((glb, mcap), (model, residuals)) = rayon::join(
+        || {
+            rayon::join(
+                || calib_report::glb::glb(scene, view),
+                || calib_report::mcap::mcap(scene, view),
+            )
+        },
+        || {
+            rayon::join(
+                || calib_report::json::exact_json(robots.model),
+                || calib_report::csv::residuals_csv(residuals),
+            )
+        },
+    );
     let stem = outputs.scene.trim_end_matches(".json");
     let mut files = vec![
         (
@@ -60,7 +74,7 @@ pub(crate) fn written(
         let text = alone.text.clone();
         files.push((OutputFile::text(alone_name(&outputs.urdf), text), what));
     }
-    let mut model = calib_report::json::exact_json(robots.model)?;
+    let mut model = model?;
     model.push('\n');
     let mut put = |name: String, text: String, what: &str| {
         files.push((OutputFile::text(name, text), what.to_owned()));
@@ -87,20 +101,20 @@ pub(crate) fn written(
     );
     put(
         "residuals.csv".to_owned(),
-        calib_report::csv::residuals_csv(residuals)?,
+        residuals?,
         "residuals of the fit, row by row",
     );
     files.push((
         OutputFile {
             name: format!("{stem}.glb"),
-            bytes: calib_report::glb::glb(scene, view)?,
+            bytes: glb?,
         },
         "robot, markers, errors as glTF for viewers".to_owned(),
     ));
     files.push((
         OutputFile {
             name: format!("{stem}.mcap"),
-            bytes: calib_report::mcap::mcap(scene, view)?,
+            bytes: mcap?,
         },
         "the poses as a recording for players (MCAP)".to_owned(),
     ));
@@ -140,10 +154,19 @@ pub(crate) fn files(
 ) -> Result<Vec<OutputFile>, PipelineError> {
     inputs.estimators.evaluated()?;
     let outputs = &inputs.robot.profile.outputs;
+    let (html, (json, markdown)) = rayon::join(
+        || calib_report::html::html(report, Some(view)),
+        || {
+            rayon::join(
+                || calib_report::json::report_json(report),
+                || calib_report::markdown::markdown(report),
+            )
+        },
+    );
     let mut files = vec![
-        OutputFile::text("report.md", calib_report::markdown::markdown(report)),
-        OutputFile::text("report.json", calib_report::json::report_json(report)?),
-        OutputFile::text("report.html", calib_report::html::html(report, Some(view))?),
+        OutputFile::text("report.md", markdown),
+        OutputFile::text("report.json", json?),
+        OutputFile::text("report.html", html?),
     ];
     files.extend(written.into_iter().map(|(file, _)| file));
     let report_json = files[1].bytes.clone();

@@ -5,10 +5,11 @@
 //! ```
 
 use calib_geometry::statistics::quantile_nearest;
-use nalgebra::{DMatrix, DVector};
+use nalgebra::DMatrix;
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
+use rayon::prelude::*;
 
 use super::ChangeSettings;
 use super::columns::Pattern;
@@ -18,6 +19,9 @@ use super::sums::Design;
 /// What is drawn of a prior's σ: robots are nearer to their drawings than priors say, and F, which T counts from, is smaller for it. Drawn in
 /// full, 1.5 % of clean recordings of six and ten poses were called changed.
 const OF_PRIORS: f64 = 0.4;
+
+/// Data sets that are simulated with the same products.
+const TOGETHER: usize = 10;
 
 /// Distribution of the largest T under the model.
 pub(super) struct Chance {
@@ -47,7 +51,16 @@ impl Chance {
         let mut draws: Vec<Vec<f64>> = Vec::with_capacity(all);
         let mut draw = |draws: &mut Vec<Vec<f64>>, until: usize| {
             while draws.len() < until {
-                draws.push(largest(levels, tests, &shifts, &mut rng));
+                let mut left = FIRST.min(until - draws.len());
+                let mut noise = Vec::new();
+                while left > 0 {
+                    let sets = left.min(TOGETHER);
+                    noise.push(Noise::of(&levels.designs[0], sets, &mut rng));
+                    left -= sets;
+                }
+                let found = noise.par_iter();
+                let found = found.flat_map_iter(|noise| largest(levels, tests, &shifts, noise));
+                draws.par_extend(found);
             }
         };
         draw(&mut draws, FIRST.min(all));
@@ -82,47 +95,61 @@ fn excess(scores: &[f64], quantiles: &[f64]) -> f64 {
     each.fold(f64::NEG_INFINITY, f64::max)
 }
 
-/// The largest T of every candidate in one simulated data set: drawn with the noise that was found, seen at every level.
+/// z and z_p of equation (1) of some simulated data sets, one in each column.
+struct Noise {
+    samples: Vec<DMatrix<f64>>,
+    priors: DMatrix<f64>,
+}
+
+impl Noise {
+    fn of(design: &Design, sets: usize, rng: &mut ChaCha8Rng) -> Self {
+        let rows = design.kept.iter().map(|kept| kept.a.nrows());
+        let mut samples: Vec<_> = rows.map(|rows| DMatrix::zeros(rows, sets)).collect();
+        let mut priors = DMatrix::zeros(design.priors.len(), sets);
+        for set in 0..sets {
+            for z in &mut samples {
+                for z in z.column_mut(set).iter_mut() {
+                    *z = StandardNormal.sample(rng);
+                }
+            }
+            for z in priors.column_mut(set).iter_mut() {
+                let drawn: f64 = StandardNormal.sample(rng);
+                *z = OF_PRIORS * drawn;
+            }
+        }
+        Self { samples, priors }
+    }
+}
+
+/// The largest T of every candidate in each of some simulated data sets: drawn with the noise that was found, seen at every level.
 fn largest(
     levels: &Levels,
     tests: &Tests,
     shifts: &[Vec<DMatrix<f64>>],
-    rng: &mut ChaCha8Rng,
-) -> Vec<f64> {
+    noise: &Noise,
+) -> Vec<Vec<f64>> {
     let own = &levels.designs[0];
-    let rows = own.kept.iter().map(|kept| kept.a.nrows());
-    let z: Vec<DVector<f64>> = rows
-        .map(|rows| DVector::from_fn(rows, |_, _| StandardNormal.sample(rng)))
-        .collect();
-    let priors: Vec<f64> = own
-        .priors
-        .iter()
-        .map(|_| {
-            let z: f64 = StandardNormal.sample(rng);
-            OF_PRIORS * z
-        })
-        .collect();
-    let drawn: Vec<Drawn> = levels
-        .designs
-        .iter()
-        .zip(shifts)
-        .enumerate()
-        .map(|(level, (design, shifts))| match level {
-            0 => drawn(design, shifts, &z, &priors),
-            _ => {
-                // e = L₀ z, as this level whitens it.
-                let pairs = own.kept.iter().zip(&design.kept).zip(&z);
-                let z: Vec<DVector<f64>> = pairs
-                    .map(|((own, kept), z)| &kept.l_inverse * (&own.l * z))
-                    .collect();
-                drawn(design, shifts, &z, &priors)
-            }
-        })
-        .collect();
-    let best = levels.best(tests, &drawn);
-    best.into_iter()
-        .map(|best| best.map_or(0.0, |best| best.score))
-        .collect()
+    let (z, priors) = (&noise.samples, &noise.priors);
+    let by_level = levels.designs.iter().zip(shifts).enumerate();
+    let by_level = by_level.map(|(level, (design, shifts))| match level {
+        0 => drawn(design, shifts, z, priors),
+        _ => {
+            // e = L₀ z, as this level whitens it.
+            let pairs = own.kept.iter().zip(&design.kept).zip(z);
+            let z: Vec<DMatrix<f64>> = pairs
+                .map(|((own, kept), z)| &kept.l_inverse * (&own.l * z))
+                .collect();
+            drawn(design, shifts, &z, priors)
+        }
+    });
+    let mut by_level: Vec<_> = by_level.map(Vec::into_iter).collect();
+    let of_set = |_| {
+        let drawn: Vec<Drawn> = by_level.iter_mut().filter_map(Iterator::next).collect();
+        let best = levels.best(tests, &drawn).into_iter();
+        best.map(|best| best.map_or(0.0, |best| best.score))
+            .collect()
+    };
+    (0..priors.ncols()).map(of_set).collect()
 }
 
 /// Eᵀ of all edges of a candidate, one below the other: one product instead of many.
@@ -139,46 +166,62 @@ fn shifts(design: &Design) -> Vec<DMatrix<f64>> {
     (0..design.columns.len()).map(of_candidate).collect()
 }
 
-/// F and U of equation (1) for residuals z of the samples and of the priors.
-fn drawn(design: &Design, shifts: &[DMatrix<f64>], z: &[DVector<f64>], priors: &[f64]) -> Drawn {
-    let n = design.covariance.nrows();
-    let mut g = DVector::zeros(n);
-    let mut cost = 0.0;
+/// F and U of equation (1) of each data set, for residuals z of the samples and of the priors.
+fn drawn(
+    design: &Design,
+    shifts: &[DMatrix<f64>],
+    z: &[DMatrix<f64>],
+    priors: &DMatrix<f64>,
+) -> Vec<Drawn> {
+    let (n, sets) = (design.covariance.nrows(), priors.ncols());
+    let mut g = DMatrix::zeros(n, sets);
+    let mut costs = vec![0.0; sets];
     let width = design.kept.first().map_or(0, |k| k.b.ncols());
     // Σ B̃ᵀz up to each sample, and the same in proportion to the place: all columns.
-    let mut steps = vec![DVector::<f64>::zeros(width)];
-    let mut linear = DVector::<f64>::zeros(width);
+    let mut steps = vec![DMatrix::<f64>::zeros(width, sets)];
+    let mut linear = DMatrix::<f64>::zeros(width, sets);
     let count = design.kept.len();
-    for (place, (kept, z)) in design.kept.iter().zip(z).enumerate() {
-        kept.a.add_transposed_vector(z, &mut g);
-        let own = kept.b.tr_mul(z);
-        linear.axpy(place as f64 / (count - 1) as f64 - 0.5, &own, 1.0);
-        steps.push(&steps[place] + own);
-        cost += z.norm_squared();
-    }
-    for (&(c, weight), &z) in design.priors.iter().zip(priors) {
-        g[c] += weight * z;
-        cost += z * z;
-    }
-    let step = -(&design.covariance * &g);
-    cost += g.dot(&step);
-    let of_candidate = |k: usize| {
-        let own = |u: &DVector<f64>| u.rows_range(design.columns[k].clone()).into_owned();
-        let mut u: Vec<DVector<f64>> = match design.patterns[k] {
-            Pattern::Step => steps.iter().map(own).collect(),
-            Pattern::Linear => vec![DVector::zeros(design.columns[k].len()), own(&linear)],
-            Pattern::Constant => vec![own(&steps[0]), own(&steps[count])],
-        };
-        // U ← U + Eᵀ δ
-        let shift = &shifts[k] * &step;
-        let edges = design.cumulative[k].len();
-        for (u, edge) in u.iter_mut().zip(0..edges) {
-            *u += shift.rows(edge * u.len(), u.len());
-        }
-        u
+    let squares = |costs: &mut [f64], of: &DMatrix<f64>| {
+        let columns = costs.iter_mut().zip(of.column_iter());
+        columns.for_each(|(cost, z)| *cost += z.norm_squared());
     };
-    let u = (0..design.columns.len()).map(of_candidate).collect();
-    Drawn { cost, u }
+    for (place, (kept, z)) in design.kept.iter().zip(z).enumerate() {
+        kept.a.add_transposed_times(1.0, z, &mut g);
+        let own = kept.b.tr_mul(z);
+        let factor = place as f64 / (count - 1) as f64 - 0.5;
+        linear.zip_apply(&own, |sum, x| *sum += factor * x);
+        steps.push(&steps[place] + own);
+        squares(&mut costs, z);
+    }
+    for (&(c, weight), z) in design.priors.iter().zip(priors.row_iter()) {
+        let mut row = g.row_mut(c);
+        row += z * weight;
+    }
+    squares(&mut costs, priors);
+    let step = -(&design.covariance * &g);
+    let shifted: Vec<DMatrix<f64>> = shifts.iter().map(|shift| shift * &step).collect();
+    let of_set = |set: usize| {
+        let of_candidate = |k: usize| {
+            let (columns, edges) = (&design.columns[k], design.cumulative[k].len());
+            let own = |u: &DMatrix<f64>, i: usize| u[(columns.start + i, set)];
+            let shifted = shifted[k].column(set);
+            // U ← U + Eᵀ δ
+            DMatrix::from_fn(columns.len(), edges, |i, edge| {
+                let u = match (design.patterns[k], edge) {
+                    (Pattern::Step, _) => own(&steps[edge], i),
+                    (_, 0) => 0.0,
+                    (Pattern::Linear, _) => own(&linear, i),
+                    (Pattern::Constant, _) => own(&steps[count], i),
+                };
+                u + shifted[edge * columns.len() + i]
+            })
+        };
+        Drawn {
+            cost: costs[set] + g.column(set).dot(&step.column(set)),
+            u: (0..design.columns.len()).map(of_candidate).collect(),
+        }
+    };
+    (0..sets).map(of_set).collect()
 }
 
 fn quantile(mut values: Vec<f64>, p: f64) -> f64 {

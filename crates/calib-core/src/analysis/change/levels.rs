@@ -2,7 +2,8 @@
 //!
 //! T and the reasons for it: `less_noise`. With one level T is that of the scan.
 
-use nalgebra::{Cholesky, DVector};
+use nalgebra::{Cholesky, DMatrix};
+use rayon::prelude::*;
 
 use super::columns::Candidates;
 use super::sums::{Design, Found, Test, score};
@@ -31,7 +32,7 @@ pub(super) struct Best {
 /// What residuals give under one design: F, and U of every candidate.
 pub(super) struct Drawn {
     pub cost: f64,
-    pub u: Vec<Vec<DVector<f64>>>,
+    pub u: Vec<DMatrix<f64>>,
 }
 
 impl Levels {
@@ -45,8 +46,13 @@ impl Levels {
     ) -> Option<Self> {
         let own = Design::new(solution, candidates, samples, edges, borders)?;
         let mut out = Self::of(own);
-        for lower in solution.with_less_noise(samples.len()) {
-            let design = Design::new(&lower, candidates, samples, edges, borders)?;
+        let lower = solution.with_less_noise(samples.len());
+        let designs: Vec<Option<Design>> = lower
+            .par_iter()
+            .map(|lower| Design::new(lower, candidates, samples, edges, borders))
+            .collect();
+        for design in designs {
+            let design = design?;
             out.log_dets.push(log_det(&design)?);
             out.designs.push(design);
         }
@@ -63,7 +69,10 @@ impl Levels {
 
     /// The tests of every candidate, by level.
     pub fn tests(&self) -> Tests {
-        let of = |design: &Design| (0..design.columns.len()).map(|k| design.tests(k)).collect();
+        let of = |design: &Design| {
+            let candidates = (0..design.columns.len()).into_par_iter();
+            candidates.map(|k| design.tests(k)).collect()
+        };
         self.designs.iter().map(of).collect()
     }
 

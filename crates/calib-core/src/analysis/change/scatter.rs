@@ -31,9 +31,13 @@ use crate::graph::ids::EdgeId;
 use crate::solve::equations::{NormalEquations, Workspace};
 use crate::solve::normal::add_prior;
 use crate::solve::parted::Parted;
-use crate::solve::whitened::{covariance_of, whitened};
+use crate::solve::whitened::{root_of, whitened};
 
-/// Samples that are looked at: (1) costs their cube.
+mod draws;
+
+use draws::Draws;
+
+/// Samples that are looked at.
 const SAMPLES: usize = 240;
 /// Changes, or missing effects, that are looked at, most significant first.
 const SUSPECTS: usize = 8;
@@ -119,9 +123,9 @@ struct Level {
     joints: Vec<EdgeId>,
     /// Columns of each suspect.
     ranges: Vec<Range<usize>>,
-    /// C, C E of the suspects.
-    covariance: DMatrix<f64>,
-    ce: DMatrix<f64>,
+    /// Tᵀ of C = T Tᵀ, and Tᵀ E of the suspects.
+    root: DMatrix<f64>,
+    along: DMatrix<f64>,
     /// U and I of all suspects.
     u: DVector<f64>,
     information: DMatrix<f64>,
@@ -335,8 +339,8 @@ impl Level {
             residuals: Vec::new(),
             joints,
             ranges,
-            covariance: DMatrix::zeros(0, 0),
-            ce: DMatrix::zeros(0, 0),
+            root: DMatrix::zeros(0, 0),
+            along: DMatrix::zeros(0, 0),
             u: DVector::zeros(width),
             information: DMatrix::zeros(0, 0),
             cost: 0.0,
@@ -373,22 +377,23 @@ impl Level {
         }
         let mut system = NormalEquations::of(&h, &g);
         add_prior(model, &solution.values, &mut system);
-        out.covariance = covariance_of(&system)?;
+        let root = root_of(&system)?;
+        // ln|H| = −ln|C|
+        out.log_det -= root.diagonal().iter().map(|x| 2.0 * x.ln()).sum::<f64>();
+        out.root = root.transpose();
         let gradient = DVector::from_column_slice(&system.g);
-        let step = -(&out.covariance * &gradient);
+        let step = -(root * (&out.root * &gradient));
         out.cost += system.prior + gradient.dot(&step);
         for (w, sample) in out.residuals.iter_mut().zip(&out.samples) {
             *w += sample.a.times_vector(&step);
             out.u.gemv_tr(1.0, &sample.suspects, w, 1.0);
         }
-        out.ce = &out.covariance * &e;
-        out.information = own - e.tr_mul(&out.ce);
+        out.along = &out.root * &e;
+        out.information = own - out.along.transpose() * &out.along;
         add_priors(&mut out.information, &candidates, &columns, &out.ranges)?;
         let parameters = model.columns.iter().map(|p| &model.problem.parameters[*p]);
         let priors = parameters.filter(|p| p.prior_sigma.is_some()).count();
         out.freedom = (out.freedom + priors as f64 - n as f64).max(1.0);
-        // ln|H| = −ln|C|
-        out.log_det -= log_det(&Cholesky::new(out.covariance.clone())?);
         (out.cost.is_finite() && out.cost > 0.0).then_some(out)
     }
 
@@ -427,44 +432,41 @@ impl Level {
 
     /// One joint scatters, with one draw for every group of samples: by σ, in `unit` rad.
     fn scattering(&self, joint: usize, groups: &[usize], unit: f64) -> Vec<(f64, Fits)> {
-        let (n, m) = (self.covariance.nrows(), count(groups));
+        let (n, m) = (self.root.nrows(), count(groups));
         let width = self.u.len();
-        let (mut e, mut u) = (DMatrix::zeros(n, m), DVector::zeros(m));
+        let mut e = DMatrix::zeros(n, m);
         let mut diagonal = DVector::<f64>::zeros(m);
-        let mut cross = DMatrix::<f64>::zeros(m, width);
+        // U of the draws, and their products with the suspects.
+        let mut seen = DMatrix::<f64>::zeros(m, 1 + width);
         for ((sample, w), &group) in self.samples.iter().zip(&self.residuals).zip(groups) {
             let own = sample.joints.column(joint);
             let mut to = e.column_mut(group);
             sample
                 .a
                 .each_transposed(&own.into_owned(), |c, x| to[c] += x);
-            u[group] += own.dot(w);
+            seen[(group, 0)] += own.dot(w);
             diagonal[group] += own.norm_squared();
             let beside = sample.suspects.tr_mul(&own);
             for c in 0..width {
-                cross[(group, c)] += beside[c];
+                seen[(group, 1 + c)] += beside[c];
             }
         }
-        cross -= e.tr_mul(&self.ce);
-        let mut k = -(e.transpose() * (&self.covariance * &e));
-        for i in 0..m {
-            k[(i, i)] += diagonal[i];
-        }
+        let f = &self.root * &e;
+        let mut cross = seen.columns_range_mut(1..);
+        cross -= f.tr_mul(&self.along);
+        let (u, cross) = (seen.column(0), seen.columns_range(1..));
+        let draws = Draws::new(diagonal, f);
         // σ² of one unit of whitened noise.
         let s2 = self.cost / self.freedom;
         let of = |&sigma: &f64| {
             let tau2 = (sigma * unit).powi(2) / s2;
-            let mut inner = k.clone();
-            for i in 0..m {
-                inner[(i, i)] += 1.0 / tau2;
-            }
-            let factor = Cholesky::new(inner)?;
-            let solved = factor.solve(&u);
+            let factored = draws.with(tau2)?;
+            let all = factored.solve(&seen);
+            let (solved, crossed) = (all.column(0), all.columns_range(1..));
             let gain = u.dot(&solved);
-            let crossed = factor.solve(&cross);
             let beside = &self.u - cross.tr_mul(&solved);
             let information = &self.information - cross.tr_mul(&crossed);
-            let log_det = log_det(&factor) + m as f64 * tau2.ln();
+            let log_det = factored.log_det + m as f64 * tau2.ln();
             let fits = self.fits(gain, log_det, &beside, &information);
             let s2 = ((self.cost - gain) / self.freedom).max(0.0);
             let sigma = (tau2 * s2).sqrt();
@@ -473,14 +475,4 @@ impl Level {
         };
         TRIED.iter().filter_map(of).collect()
     }
-}
-
-/// ln of the determinant of what was factored.
-fn log_det(factor: &Cholesky<f64, nalgebra::Dyn>) -> f64 {
-    factor
-        .l_dirty()
-        .diagonal()
-        .iter()
-        .map(|x| 2.0 * x.ln())
-        .sum()
 }

@@ -4,11 +4,9 @@ use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::columns::{Candidates, Pattern};
 use crate::analysis::solution::Solution;
-use crate::solve::equations::{NormalEquations, Workspace};
-use crate::solve::normal::add_prior;
 use crate::solve::parted::Parted;
-use crate::solve::whitened::{Whitened, covariance_of, whitened};
 
+mod filled;
 mod others;
 
 /// Fewest samples on either side of a step: one or two bad poses are outliers, not a change.
@@ -66,20 +64,6 @@ impl Sum {
         }
     }
 
-    /// Adds the columns of a candidate among ÃᵀB̃ and B̃ᵀB̃ of one sample.
-    fn add(
-        &mut self,
-        ab: &DMatrix<f64>,
-        bb: &DMatrix<f64>,
-        columns: &std::ops::Range<usize>,
-        factor: f64,
-    ) {
-        let own = ab.columns_range(columns.clone());
-        self.e.zip_apply(&own, |sum, x| *sum += factor * x);
-        let own = bb.view_range(columns.clone(), columns.clone());
-        self.g.zip_apply(&own, |sum, x| *sum += factor * factor * x);
-    }
-
     /// Adds what lies between two cumulative sums.
     fn add_between(&mut self, from: &Self, to: &Self) {
         let add = |sum: &mut DMatrix<f64>, from: &DMatrix<f64>, to: &DMatrix<f64>| {
@@ -118,8 +102,8 @@ pub(super) struct Design {
     pub columns: Vec<std::ops::Range<usize>>,
     /// By candidate: cumulative sums up to each edge; for other patterns than steps nothing and the whole.
     pub cumulative: Vec<Vec<Sum>>,
-    /// U in the same way, at the minimum.
-    pub u: Vec<Vec<DVector<f64>>>,
+    /// U in the same way, at the minimum, column by column.
+    pub u: Vec<DMatrix<f64>>,
     /// P of equation (1) by candidate.
     wide: Vec<f64>,
     /// Samples, for designs that are simulated.
@@ -176,108 +160,6 @@ impl Design {
         Some(out)
     }
 
-    fn fill(
-        &mut self,
-        solution: &Solution,
-        candidates: &Candidates,
-        samples: &[usize],
-    ) -> Option<()> {
-        // Few enough to be simulated.
-        let keep = samples.len() <= SIMULATED + self.parts.len();
-        let model = &solution.model;
-        let n = model.free();
-        let mut work = Workspace::new(model);
-        work.cache.update(&model.problem, &solution.values);
-        let mut h = DMatrix::zeros(n, n);
-        let mut g = DVector::zeros(n);
-        let sizes: Vec<usize> = self.columns.iter().map(ExactSizeIterator::len).collect();
-        let mut sums: Vec<Sum> = sizes.iter().map(|d| Sum::zeros(n, *d)).collect();
-        let mut us: Vec<DVector<f64>> = sizes.iter().map(|d| DVector::zeros(*d)).collect();
-        self.cumulative = vec![Vec::new(); sizes.len()];
-        self.u = vec![Vec::new(); sizes.len()];
-        let mut bin = 0;
-        for (place, &sample) in samples.iter().enumerate() {
-            while bin < self.edges.len() && self.edges[bin] <= sample {
-                for k in 0..sizes.len() {
-                    if self.patterns[k] == Pattern::Step || bin == 0 {
-                        self.cumulative[k].push(sums[k].clone());
-                        self.u[k].push(us[k].clone());
-                    }
-                }
-                bin += 1;
-            }
-            let Some(rows) = whitened(solution.objective(), &solution.values, sample, &mut work)
-            else {
-                continue;
-            };
-            let b = candidates.whitened(solution, sample, &rows, &work);
-            rows.a.add_gram(1.0, &mut h);
-            rows.a.add_transposed_vector(&rows.w, &mut g);
-            let (ab, bb) = (rows.a.transposed_times(&b), b.transpose() * &b);
-            let bw = b.tr_mul(&rows.w);
-            self.cost += rows.w.norm_squared();
-            self.rows += rows.w.len() as f64;
-            self.log_det += rows.log_det;
-            for k in 0..sizes.len() {
-                let columns = &self.columns[k];
-                let factor = self.factor(k, place, samples.len());
-                us[k].axpy(factor, &bw.rows_range(columns.clone()), 1.0);
-                sums[k].add(&ab, &bb, columns, factor);
-            }
-            if keep {
-                let Whitened {
-                    a, l, l_inverse, ..
-                } = rows;
-                self.kept.push(Kept { a, b, l, l_inverse });
-            }
-        }
-        for (k, (sum, u)) in sums.into_iter().zip(us).enumerate() {
-            self.cumulative[k].push(sum);
-            self.u[k].push(u);
-        }
-        self.solve(solution, &h, &g)
-    }
-
-    /// What a candidate's columns are multiplied by at a sample: its place from −½ to ½ for a drift.
-    pub(super) fn factor(&self, candidate: usize, place: usize, samples: usize) -> f64 {
-        match self.patterns[candidate] {
-            Pattern::Linear => place as f64 / (samples - 1) as f64 - 0.5,
-            _ => 1.0,
-        }
-    }
-
-    /// C of the samples, F at their own minimum, and U there: one Gauss–Newton step from the fit, which is zero where
-    /// the samples are those of the fit.
-    fn solve(&mut self, solution: &Solution, h: &DMatrix<f64>, g: &DVector<f64>) -> Option<()> {
-        let model = &solution.model;
-        let n = model.free();
-        let mut system = NormalEquations::new(n);
-        for a in 0..n {
-            for b in a..n {
-                system.h[a * n + b] = h[(a, b)];
-            }
-            system.g[a] = g[a];
-        }
-        add_prior(model, &solution.values, &mut system);
-        self.covariance = covariance_of(&system)?;
-        let gradient = DVector::from_row_slice(&system.g);
-        // δ = −C g,   U ← U + Eᵀ δ,   F ← F − gᵀ C g
-        let step = -(&self.covariance * &gradient);
-        self.cost += system.prior + gradient.dot(&step);
-        for (sums, us) in self.cumulative.iter_mut().zip(&mut self.u) {
-            for (sum, u) in sums.iter_mut().zip(us) {
-                *u += sum.e.tr_mul(&step);
-                sum.ce = &self.covariance * &sum.e;
-            }
-        }
-        for (c, &p) in model.columns.iter().enumerate() {
-            if let Some(sigma) = model.problem.parameters[p].prior_sigma {
-                self.priors.push((c, 1.0 / sigma));
-            }
-        }
-        (self.cost.is_finite() && self.rows > 0.0).then_some(())
-    }
-
     /// Degrees of freedom ν beside the parameters of the fit and `jumps` more; those that their prior holds cost none.
     pub(super) fn freedom(&self, jumps: usize) -> f64 {
         let unknowns = self.covariance.nrows() + jumps;
@@ -308,7 +190,7 @@ impl Design {
         &self,
         candidate: usize,
         after: &After,
-        u: &[DVector<f64>],
+        u: &DMatrix<f64>,
     ) -> Option<Found> {
         let inverse = self.inverse(candidate, after)?;
         Some(found(after, &inverse, &self.u_of(u, after)))
@@ -373,17 +255,17 @@ impl Design {
         out
     }
 
-    fn u_of(&self, u: &[DVector<f64>], after: &After) -> DVector<f64> {
-        let mut out = DVector::zeros(u[after.end].len());
+    fn u_of(&self, u: &DMatrix<f64>, after: &After) -> DVector<f64> {
+        let mut out = DVector::zeros(u.nrows());
         self.set_u_of(u, after, &mut out);
         out
     }
 
-    fn set_u_of(&self, u: &[DVector<f64>], after: &After, out: &mut DVector<f64>) {
-        u[after.end].sub_to(&u[after.first], out);
+    fn set_u_of(&self, u: &DMatrix<f64>, after: &After, out: &mut DVector<f64>) {
+        u.column(after.end).sub_to(&u.column(after.first), out);
         for (from, to) in self.runs(after) {
-            *out += &u[to];
-            *out -= &u[from];
+            *out += u.column(to);
+            *out -= u.column(from);
         }
     }
 
@@ -416,7 +298,7 @@ impl Design {
         &self,
         candidate: usize,
         tests: &[Test],
-        u: &[DVector<f64>],
+        u: &DMatrix<f64>,
     ) -> Option<Found> {
         let mut of_part: Vec<Option<(f64, &Test)>> = vec![None; self.parts.len() - 1];
         // Many tests of few columns: memory is taken once.

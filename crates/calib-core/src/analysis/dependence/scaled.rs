@@ -19,14 +19,32 @@ pub(super) struct Scaled {
     pub starts: bool,
 }
 
+/// A row of an observation: measurement, point and number.
+type Row = (usize, usize, usize);
+
+/// The same before its rows have the numbers of those of earlier samples.
+pub(super) struct Unnumbered {
+    k: DMatrix<f64>,
+    w: DMatrix<f64>,
+    y: DVector<f64>,
+    rows: Vec<Option<Row>>,
+}
+
+impl Unnumbered {
+    pub(super) fn numbered(self, starts: bool, keys: &mut Keys) -> Scaled {
+        let rows = self.rows.into_iter();
+        Scaled {
+            k: self.k,
+            w: self.w,
+            y: self.y,
+            keys: rows.map(|row| row.map(|row| keys.of(row))).collect(),
+            starts,
+        }
+    }
+}
+
 /// W = σ V⁻¹ σ,   k = σ V⁻¹ J,   y = σ V⁻¹ e
-pub(super) fn scaled_sample(
-    solution: &Solution,
-    rows: &Whitened,
-    of: MemoryOf,
-    starts: bool,
-    keys: &mut Keys,
-) -> Scaled {
+pub(super) fn scaled_sample(solution: &Solution, rows: &Whitened, of: MemoryOf) -> Unnumbered {
     let m = rows.w.len();
     let mut sigma = vec![1.0; m];
     let mut own = vec![None; m];
@@ -46,7 +64,7 @@ pub(super) fn scaled_sample(
         };
         for i in 0..count {
             if asked(of, kind, i) {
-                own[first + i] = Some(keys.of(observation.measurement, part, i));
+                own[first + i] = Some((observation.measurement, part, i));
             }
         }
     }
@@ -67,12 +85,11 @@ pub(super) fn scaled_sample(
     }
     // The product of a transpose has no fast kernel.
     let transposed = scaled.transpose();
-    Scaled {
+    Unnumbered {
         k: rows.a.transposed_times(&scaled).transpose(),
         y: &transposed * &rows.w,
         w: &transposed * &scaled,
-        keys: own,
-        starts,
+        rows: own,
     }
 }
 
@@ -98,13 +115,12 @@ fn asked(of: MemoryOf, kind: &MeasurementKind, row: usize) -> bool {
     }
 }
 
-/// Numbers of (measurement, point, row).
+/// Numbers of rows.
 #[derive(Default)]
-pub(super) struct Keys(Vec<(usize, usize, usize)>);
+pub(super) struct Keys(Vec<Row>);
 
 impl Keys {
-    fn of(&mut self, measurement: usize, part: usize, row: usize) -> usize {
-        let key = (measurement, part, row);
+    fn of(&mut self, key: Row) -> usize {
         self.0.iter().position(|k| *k == key).unwrap_or_else(|| {
             self.0.push(key);
             self.0.len() - 1

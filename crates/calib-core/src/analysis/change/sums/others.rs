@@ -3,7 +3,7 @@
 //! Every recording is behind it or before it. Of few recordings the one that helps most is moved to the other side, as long as that helps. Of many
 //! that would cost the cube of their number: from the best few beginnings, one recording after the other is moved where that helps, until none does.
 
-use nalgebra::{Cholesky, DVector};
+use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::{After, Design, Found, Sum};
 use crate::analysis::change::columns::Pattern;
@@ -26,7 +26,7 @@ impl Design {
         &self,
         candidate: usize,
         mut firsts: Vec<Found>,
-        u: &[DVector<f64>],
+        u: &DMatrix<f64>,
     ) -> Option<Found> {
         let many = self.parts.len() - 1 > FEW && self.patterns[candidate] == Pattern::Step;
         if many {
@@ -40,7 +40,7 @@ impl Design {
         extended.max_by(|a, b| a.gain.total_cmp(&b.gain))
     }
 
-    fn extended(&self, candidate: usize, mut best: Found, u: &[DVector<f64>]) -> Option<Found> {
+    fn extended(&self, candidate: usize, mut best: Found, u: &DMatrix<f64>) -> Option<Found> {
         if self.patterns[candidate] != Pattern::Step {
             return Some(best);
         }
@@ -71,7 +71,7 @@ impl Design {
         &self,
         candidate: usize,
         first: Found,
-        u: &[DVector<f64>],
+        u: &DMatrix<f64>,
     ) -> Option<Found> {
         let sums = &self.cumulative[candidate];
         let count = self.parts.len() - 1;
@@ -99,7 +99,7 @@ impl Design {
                 }
                 let mut trial = sum.clone();
                 trial.add_between(&sums[from], &sums[to]);
-                let moved = &along + &u[to] - &u[from];
+                let moved = &along + u.column(to) - u.column(from);
                 let better = self.gain_of(candidate, &trial, &moved);
                 if let Some(better) = better.filter(|g| *g > gain * (1.0 + ROUNDING)) {
                     (sum, along, gain, inside) = (trial, moved, better, then);
