@@ -21,7 +21,7 @@ pub(crate) fn covariance_of(system: &NormalEquations) -> Option<DMatrix<f64>> {
     Some(root * transposed)
 }
 
-/// T of C = T Tᵀ, upper triangular.
+/// R of C = R Rᵀ, upper triangular.
 pub(crate) fn root_of(system: &NormalEquations) -> Option<DMatrix<f64>> {
     /// Relative ridge: far below any direction that influences a prediction.
     const RIDGE: f64 = 1e-11;
@@ -51,7 +51,7 @@ pub(crate) fn root_of(system: &NormalEquations) -> Option<DMatrix<f64>> {
             l[i * n + i] = 1.0 + ridge;
         }
     }
-    // T = S L⁻ᵀ; row after row of L⁻¹ is column after column of its transpose.
+    // R = S L⁻ᵀ; row after row of L⁻¹ is column after column of its transpose.
     let mut inverse = lower_inverse(&l, n);
     for row in inverse.chunks_exact_mut(n.max(1)) {
         row.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);

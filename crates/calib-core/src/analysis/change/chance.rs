@@ -1,7 +1,7 @@
 //! How large T becomes by chance: data are drawn from the model and scanned.
 //!
 //! ```text
-//! z ~ N(0, I),   z_p ~ N(0, 0.16 I),   g = Aᵀz + Λ^½ z_p,   δ = −C g,   U = Σ_{s∈S} B̃ᵀz + Eᵀδ,   F = |z|² + |z_p|² − gᵀ C g     (1)
+//! z ~ N(0, I),   z_p ~ N(0, 0.16 I),   g = Aᵀz + Λ^½ z_p,   a = Rᵀ g,   U = Σ_{s∈S} B̃ᵀz − (Rᵀ E)ᵀ a,   F = |z|² + |z_p|² − |a|²     (1)
 //! ```
 
 use calib_geometry::statistics::quantile_nearest;
@@ -152,14 +152,14 @@ fn largest(
     (0..priors.ncols()).map(of_set).collect()
 }
 
-/// Eᵀ of all edges of a candidate, one below the other: one product instead of many.
+/// (Rᵀ E)ᵀ of all edges of a candidate, one below the other: one product instead of many.
 fn shifts(design: &Design) -> Vec<DMatrix<f64>> {
-    let n = design.covariance.nrows();
+    let n = design.root.nrows();
     let of_candidate = |k: usize| {
         let (sums, d) = (&design.cumulative[k], design.columns[k].len());
         let mut all = DMatrix::zeros(sums.len() * d, n);
         for (edge, sum) in sums.iter().enumerate() {
-            all.rows_mut(edge * d, d).tr_copy_from(&sum.e);
+            all.rows_mut(edge * d, d).tr_copy_from(&sum.f);
         }
         all
     };
@@ -173,10 +173,10 @@ fn drawn(
     z: &[DMatrix<f64>],
     priors: &DMatrix<f64>,
 ) -> Vec<Drawn> {
-    let (n, sets) = (design.covariance.nrows(), priors.ncols());
+    let (n, sets) = (design.root.nrows(), priors.ncols());
     let mut g = DMatrix::zeros(n, sets);
     let mut costs = vec![0.0; sets];
-    let width = design.kept.first().map_or(0, |k| k.b.ncols());
+    let width = design.kept.first().map_or(0, |k| k.b.nrows());
     // Σ B̃ᵀz up to each sample, and the same in proportion to the place: all columns.
     let mut steps = vec![DMatrix::<f64>::zeros(width, sets)];
     let mut linear = DMatrix::<f64>::zeros(width, sets);
@@ -187,7 +187,7 @@ fn drawn(
     };
     for (place, (kept, z)) in design.kept.iter().zip(z).enumerate() {
         kept.a.add_transposed_times(1.0, z, &mut g);
-        let own = kept.b.tr_mul(z);
+        let own = &kept.b * z;
         let factor = place as f64 / (count - 1) as f64 - 0.5;
         linear.zip_apply(&own, |sum, x| *sum += factor * x);
         steps.push(&steps[place] + own);
@@ -198,14 +198,13 @@ fn drawn(
         row += z * weight;
     }
     squares(&mut costs, priors);
-    let step = -(&design.covariance * &g);
-    let shifted: Vec<DMatrix<f64>> = shifts.iter().map(|shift| shift * &step).collect();
+    let along = &design.root * &g;
+    let shifted: Vec<DMatrix<f64>> = shifts.iter().map(|shift| shift * &along).collect();
     let of_set = |set: usize| {
         let of_candidate = |k: usize| {
             let (columns, edges) = (&design.columns[k], design.cumulative[k].len());
             let own = |u: &DMatrix<f64>, i: usize| u[(columns.start + i, set)];
             let shifted = shifted[k].column(set);
-            // U ← U + Eᵀ δ
             DMatrix::from_fn(columns.len(), edges, |i, edge| {
                 let u = match (design.patterns[k], edge) {
                     (Pattern::Step, _) => own(&steps[edge], i),
@@ -213,11 +212,11 @@ fn drawn(
                     (Pattern::Linear, _) => own(&linear, i),
                     (Pattern::Constant, _) => own(&steps[count], i),
                 };
-                u + shifted[edge * columns.len() + i]
+                u - shifted[edge * columns.len() + i]
             })
         };
         Drawn {
-            cost: costs[set] + g.column(set).dot(&step.column(set)),
+            cost: costs[set] - along.column(set).norm_squared(),
             u: (0..design.columns.len()).map(of_candidate).collect(),
         }
     };

@@ -2,7 +2,7 @@
 //!
 //! T and the reasons for it: `less_noise`. With one level T is that of the scan.
 
-use nalgebra::{Cholesky, DMatrix};
+use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use super::columns::Candidates;
@@ -124,12 +124,8 @@ impl Levels {
 
 /// Σ ln|V| + ln|H|.
 fn log_det(design: &Design) -> Option<f64> {
-    let factor = Cholesky::new(design.covariance.clone())?;
-    let of_covariance: f64 = factor
-        .l_dirty()
-        .diagonal()
-        .iter()
-        .map(|x| 2.0 * x.ln())
-        .sum();
-    Some(design.log_det - of_covariance)
+    let of_covariance: f64 = design.root.diagonal().iter().map(|x| 2.0 * x.ln()).sum();
+    of_covariance
+        .is_finite()
+        .then_some(design.log_det - of_covariance)
 }

@@ -107,8 +107,9 @@ impl Left {
 /// One sample in whitened form.
 struct Sample {
     a: Parted,
-    /// Columns of the joints, in the order of [`Level::joints`].
+    /// Columns G̃ of the joints, in the order of [`Level::joints`], and ÃᵀG̃.
     joints: DMatrix<f64>,
+    a_joints: DMatrix<f64>,
     /// Columns of the suspects.
     suspects: DMatrix<f64>,
 }
@@ -123,7 +124,7 @@ struct Level {
     joints: Vec<EdgeId>,
     /// Columns of each suspect.
     ranges: Vec<Range<usize>>,
-    /// Tᵀ of C = T Tᵀ, and Tᵀ E of the suspects.
+    /// Rᵀ of C = R Rᵀ, and Rᵀ E of the suspects.
     root: DMatrix<f64>,
     along: DMatrix<f64>,
     /// U and I of all suspects.
@@ -369,9 +370,11 @@ impl Level {
             out.log_det += rows.log_det;
             out.numbers.push(sample);
             out.residuals.push(rows.w);
+            let joints = all.select_columns(&places);
             out.samples.push(Sample {
+                a_joints: rows.a.transposed_times(&joints),
                 a: rows.a,
-                joints: all.select_columns(&places),
+                joints,
                 suspects: b,
             });
         }
@@ -441,9 +444,7 @@ impl Level {
         for ((sample, w), &group) in self.samples.iter().zip(&self.residuals).zip(groups) {
             let own = sample.joints.column(joint);
             let mut to = e.column_mut(group);
-            sample
-                .a
-                .each_transposed(&own.into_owned(), |c, x| to[c] += x);
+            to += sample.a_joints.column(joint);
             seen[(group, 0)] += own.dot(w);
             diagonal[group] += own.norm_squared();
             let beside = sample.suspects.tr_mul(&own);

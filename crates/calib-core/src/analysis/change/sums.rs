@@ -1,10 +1,12 @@
 //! Cumulative sums of equation (1) over the samples, and the best set of samples of a candidate.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 use super::columns::{Candidates, Pattern};
 use crate::analysis::solution::Solution;
+use crate::solve::cholesky::cholesky_in_place;
 use crate::solve::parted::Parted;
+use crate::solve::whitened::lower_inverse;
 
 mod filled;
 mod others;
@@ -41,25 +43,24 @@ pub(super) struct Found {
 /// One sample, kept for the simulation.
 pub(super) struct Kept {
     pub a: Parted,
+    /// B̃ᵀ.
     pub b: DMatrix<f64>,
     /// L and L⁻¹.
     pub l: DMatrix<f64>,
     pub l_inverse: DMatrix<f64>,
 }
 
-/// E, C E and Σ B̃ᵀB̃ of one candidate over a set of samples.
+/// Rᵀ E, C = R Rᵀ, and Σ B̃ᵀB̃ of one candidate over a set of samples.
 #[derive(Clone)]
 pub(super) struct Sum {
-    pub e: DMatrix<f64>,
-    ce: DMatrix<f64>,
+    pub f: DMatrix<f64>,
     g: DMatrix<f64>,
 }
 
 impl Sum {
     fn zeros(n: usize, d: usize) -> Self {
         Self {
-            e: DMatrix::zeros(n, d),
-            ce: DMatrix::zeros(n, d),
+            f: DMatrix::zeros(n, d),
             g: DMatrix::zeros(d, d),
         }
     }
@@ -67,10 +68,11 @@ impl Sum {
     /// Adds what lies between two cumulative sums.
     fn add_between(&mut self, from: &Self, to: &Self) {
         let add = |sum: &mut DMatrix<f64>, from: &DMatrix<f64>, to: &DMatrix<f64>| {
-            sum.zip_zip_apply(from, to, |sum, from, to| *sum += to - from);
+            let between = from.as_slice().iter().zip(to.as_slice());
+            let sums = sum.as_mut_slice().iter_mut().zip(between);
+            sums.for_each(|(sum, (from, to))| *sum += to - from);
         };
-        add(&mut self.e, &from.e, &to.e);
-        add(&mut self.ce, &from.ce, &to.ce);
+        add(&mut self.f, &from.f, &to.f);
         add(&mut self.g, &from.g, &to.g);
     }
 }
@@ -78,7 +80,25 @@ impl Sum {
 /// A set with I⁻¹: everything of a test that does not depend on the residuals.
 pub(super) struct Test {
     after: After,
+    /// Its first and last edges, neighbors together.
+    runs: Vec<(usize, usize)>,
     inverse: DMatrix<f64>,
+}
+
+impl Test {
+    /// Uᵀ I⁻¹ U; `own` is room for U.
+    fn gain(&self, u: &DMatrix<f64>, own: &mut [f64]) -> f64 {
+        let (d, u) = (own.len(), u.as_slice());
+        own.fill(0.0);
+        for (from, to) in &self.runs {
+            let ends = u[from * d..][..d].iter().zip(&u[to * d..][..d]);
+            let between = own.iter_mut().zip(ends);
+            between.for_each(|(own, (from, to))| *own += to - from);
+        }
+        let columns = self.inverse.as_slice().chunks_exact(d);
+        let along = |column: &[f64]| column.iter().zip(&*own).map(|(a, b)| a * b).sum::<f64>();
+        own.iter().zip(columns).map(|(u, c)| u * along(c)).sum()
+    }
 }
 
 /// The scan of a set of samples.
@@ -89,7 +109,8 @@ pub(super) struct Design {
     places: Vec<usize>,
     /// First edge of every recording, and the last edge.
     parts: Vec<usize>,
-    pub covariance: DMatrix<f64>,
+    /// Rᵀ of C = R Rᵀ.
+    pub root: DMatrix<f64>,
     /// Columns with a prior, and 1/σ of it.
     pub priors: Vec<(usize, f64)>,
     /// F of equation (2).
@@ -144,7 +165,7 @@ impl Design {
             edges: at,
             places,
             parts,
-            covariance: DMatrix::zeros(0, 0),
+            root: DMatrix::zeros(0, 0),
             priors: Vec::new(),
             cost: 0.0,
             rows: 0.0,
@@ -162,7 +183,7 @@ impl Design {
 
     /// Degrees of freedom ν beside the parameters of the fit and `jumps` more; those that their prior holds cost none.
     pub(super) fn freedom(&self, jumps: usize) -> f64 {
-        let unknowns = self.covariance.nrows() + jumps;
+        let unknowns = self.root.nrows() + jumps;
         (self.rows + self.priors.len() as f64 - unknowns as f64).max(1.0)
     }
 
@@ -247,7 +268,7 @@ impl Design {
 
     fn sum(&self, candidate: usize, after: &After) -> Sum {
         let sums = &self.cumulative[candidate];
-        let mut out = Sum::zeros(sums[0].e.nrows(), sums[0].e.ncols());
+        let mut out = Sum::zeros(sums[0].f.nrows(), sums[0].f.ncols());
         out.add_between(&sums[after.first], &sums[after.end]);
         for (from, to) in self.runs(after) {
             out.add_between(&sums[from], &sums[to]);
@@ -256,27 +277,29 @@ impl Design {
     }
 
     fn u_of(&self, u: &DMatrix<f64>, after: &After) -> DVector<f64> {
-        let mut out = DVector::zeros(u.nrows());
-        self.set_u_of(u, after, &mut out);
-        out
-    }
-
-    fn set_u_of(&self, u: &DMatrix<f64>, after: &After, out: &mut DVector<f64>) {
-        u.column(after.end).sub_to(&u.column(after.first), out);
+        let mut out = u.column(after.end) - u.column(after.first);
         for (from, to) in self.runs(after) {
-            *out += u.column(to);
-            *out -= u.column(from);
+            out += u.column(to);
+            out -= u.column(from);
         }
+        out
     }
 
     /// I of equation (1), inverted; `None` where it is not positive.
     fn inverse(&self, candidate: usize, after: &After) -> Option<DMatrix<f64>> {
         let information = self.information(candidate, &self.sum(candidate, after));
-        Some(Cholesky::new(information)?.inverse())
+        let n = information.nrows();
+        let mut l = information.as_slice().to_vec();
+        if !cholesky_in_place(&mut l, n) {
+            return None;
+        }
+        // Row after row of L⁻¹ is column after column of its transpose.
+        let transposed = DMatrix::from_vec(n, n, lower_inverse(&l, n));
+        Some(&transposed * transposed.transpose())
     }
 
     fn information(&self, candidate: usize, sum: &Sum) -> DMatrix<f64> {
-        let mut information = &sum.g - sum.e.tr_mul(&sum.ce);
+        let mut information = &sum.g - sum.f.tr_mul(&sum.f);
         for i in 0..information.nrows() {
             information[(i, i)] += self.wide[candidate];
         }
@@ -287,7 +310,12 @@ impl Design {
         let sets = self.sets(candidate).into_iter();
         sets.filter_map(|after| {
             let inverse = self.inverse(candidate, &after)?;
-            Some(Test { after, inverse })
+            let runs = std::iter::once((after.first, after.end));
+            Some(Test {
+                runs: runs.chain(self.runs(&after)).collect(),
+                after,
+                inverse,
+            })
         })
         .collect()
     }
@@ -302,12 +330,9 @@ impl Design {
     ) -> Option<Found> {
         let mut of_part: Vec<Option<(f64, &Test)>> = vec![None; self.parts.len() - 1];
         // Many tests of few columns: memory is taken once.
-        let mut own = DVector::zeros(self.columns[candidate].len());
-        let mut step = own.clone();
+        let mut own = vec![0.0; self.columns[candidate].len()];
         for test in tests {
-            self.set_u_of(u, &test.after, &mut own);
-            step.gemv(1.0, &test.inverse, &own, 0.0);
-            let gain = own.dot(&step);
+            let gain = test.gain(u, &mut own);
             let best = &mut of_part[test.after.part];
             if gain.is_finite() && best.is_none_or(|(g, _)| gain > g) {
                 *best = Some((gain, test));

@@ -1,7 +1,7 @@
 //! The information about the draws of a joint that scatters, factored where it is smaller: over the draws, or over the unknowns of the fit.
 //!
 //! ```text
-//! K + τ⁻² = Δ − FᵀF,   Δ = τ⁻² + Σ G̃ᵀG̃,   F = Tᵀ E,   C = T Tᵀ                                       (1)
+//! K + τ⁻² = Δ − FᵀF,   Δ = τ⁻² + Σ G̃ᵀG̃,   F = Rᵀ E,   C = R Rᵀ                                       (1)
 //! (Δ − FᵀF)⁻¹ = Δ⁻¹ + WᵀM⁻¹W,   W = F Δ⁻¹,   M = 1 − F Δ⁻¹ Fᵀ,   |Δ − FᵀF| = |Δ| |M|                 (2)
 //! ```
 

@@ -8,7 +8,7 @@ use crate::analysis::change::columns::{Candidates, Pattern};
 use crate::analysis::solution::Solution;
 use crate::solve::equations::{NormalEquations, Workspace};
 use crate::solve::normal::add_prior;
-use crate::solve::whitened::{Whitened, covariance_of, whitened};
+use crate::solve::whitened::{Whitened, root_of, whitened};
 
 /// Samples that are looked at one after the other, and those whose products are held at once: the same bits for any number of cores.
 const TOGETHER: usize = 16;
@@ -53,6 +53,7 @@ impl Design {
         let mut h = DMatrix::zeros(n, n);
         let mut g = DVector::zeros(n);
         let sizes: Vec<usize> = self.columns.iter().map(ExactSizeIterator::len).collect();
+        // E in place of Rᵀ E as long as C is not known.
         let mut sums: Vec<Sum> = sizes.iter().map(|d| Sum::zeros(n, *d)).collect();
         let mut us: Vec<DVector<f64>> = sizes.iter().map(|d| DVector::zeros(*d)).collect();
         self.cumulative = vec![Vec::new(); sizes.len()];
@@ -137,7 +138,12 @@ impl Design {
                 cost: w.norm_squared(),
                 rows: w.len() as f64,
                 log_det,
-                kept: keep.then_some(Kept { a, b, l, l_inverse }),
+                kept: keep.then(|| Kept {
+                    a,
+                    b: b.transpose(),
+                    l,
+                    l_inverse,
+                }),
             });
         }
         out
@@ -168,7 +174,7 @@ impl Design {
             let factor = self.factor(k, seen.place, samples);
             us[k].axpy(factor, &seen.bw.rows_range(columns.clone()), 1.0);
             let ab = seen.ab.columns_range(columns.clone());
-            sums[k].e.zip_apply(&ab, |sum, x| *sum += factor * x);
+            sums[k].f.zip_apply(&ab, |sum, x| *sum += factor * x);
             sums[k].g.zip_apply(bb, |sum, x| *sum += factor * factor * x);
         }
         self.kept.extend(seen.kept);
@@ -188,17 +194,16 @@ impl Design {
         let model = &solution.model;
         let mut system = NormalEquations::of(h, g);
         add_prior(model, &solution.values, &mut system);
-        self.covariance = covariance_of(&system)?;
-        let gradient = DVector::from_row_slice(&system.g);
-        // δ = −C g,   U ← U + Eᵀ δ,   F ← F − gᵀ C g
-        let covariance = &self.covariance;
-        let step = -(covariance * &gradient);
-        self.cost += system.prior + gradient.dot(&step);
+        self.root = root_of(&system)?.transpose();
+        // δ = −R a,   a = Rᵀ g,   U ← U + Eᵀ δ,   F ← F − gᵀ C g
+        let root = &self.root;
+        let along = root * DVector::from_row_slice(&system.g);
+        self.cost += system.prior - along.norm_squared();
         let of_candidates = self.cumulative.par_iter_mut().zip(&mut self.u);
         of_candidates.for_each(|(sums, us)| {
             for (sum, mut u) in sums.iter_mut().zip(us.column_iter_mut()) {
-                u += sum.e.tr_mul(&step);
-                sum.ce = covariance * &sum.e;
+                sum.f = root * &sum.f;
+                u -= sum.f.tr_mul(&along);
             }
         });
         for (c, &p) in model.columns.iter().enumerate() {
