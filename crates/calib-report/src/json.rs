@@ -25,8 +25,7 @@ pub fn report_json(report: &Report) -> Result<String, ReportError> {
 /// As [`report_json`].
 pub fn selection_json(selection: &Selection) -> Result<String, ReportError> {
     let value = rounded(to_value(selection)?);
-    Selection::deserialize(&value)
-        .map_err(|source| ReportError::NotFinite(source.to_string()))?;
+    Selection::deserialize(&value).map_err(|source| ReportError::NotFinite(source.to_string()))?;
     Ok(pretty(&value))
 }
 
@@ -36,8 +35,7 @@ pub fn selection_json(selection: &Selection) -> Result<String, ReportError> {
 /// As [`report_json`].
 pub fn checks_json(checks: &DataChecks) -> Result<String, ReportError> {
     let value = rounded(to_value(checks)?);
-    DataChecks::deserialize(&value)
-        .map_err(|source| ReportError::NotFinite(source.to_string()))?;
+    DataChecks::deserialize(&value).map_err(|source| ReportError::NotFinite(source.to_string()))?;
     Ok(pretty(&value) + "\n")
 }
 
@@ -48,8 +46,7 @@ pub fn checks_json(checks: &DataChecks) -> Result<String, ReportError> {
 pub fn report_value(report: &Report) -> Result<Value, ReportError> {
     let value = rounded(to_value(report)?);
     // serde_json writes NaN as null; a null where a number must be does not read back.
-    Report::deserialize(&value)
-        .map_err(|source| ReportError::NotFinite(source.to_string()))?;
+    Report::deserialize(&value).map_err(|source| ReportError::NotFinite(source.to_string()))?;
     Ok(value)
 }
 

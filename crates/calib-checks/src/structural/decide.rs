@@ -88,10 +88,8 @@ pub fn explain(data: &Data, options: &Options) -> Result<Outcome, DataError> {
         false => None,
     };
     // Most data need no correction: the tests do not wait for the decision.
-    let (correction, as_they_are) = rayon::join(
-        || decided(&asked, &mut outcome),
-        || continuous_of(work),
-    );
+    let (correction, as_they_are) =
+        rayon::join(|| decided(&asked, &mut outcome), || continuous_of(work));
     outcome.continuous = match correction.is_empty() {
         true => as_they_are,
         false => continuous_of(&apply_all(&correction, work)),
@@ -219,9 +217,7 @@ fn screened_ranking(data: &Data, candidates: &[Candidate]) -> (Ranking, Vec<Samp
             .par_iter()
             .map(|leader| screen(data, leader))
             .collect();
-        let found = found
-            .into_iter()
-            .min_by(|a, b| a.scale.total_cmp(&b.scale));
+        let found = found.into_iter().min_by(|a, b| a.scale.total_cmp(&b.scale));
         let Some(found) = found.filter(|f| f.matters && f.samples != screened) else {
             break;
         };

@@ -91,7 +91,7 @@ const ROUNDS: usize = 8;
 
 impl Solution {
     /// Estimates the memory of the noise from successive samples; `borders` are the first samples of recordings, across which nothing is
-    /// remembered. Where the residuals do not show one, decay and share are zero. `None` where fewer than eight samples or no pairs of rows exist.
+    /// remembered. Where the residuals do not show one, decay and share are zero, and correlation and z may be bounds that are too large. `None` where fewer than eight samples or no pairs of rows exist.
     #[must_use]
     pub fn dependence(&self, borders: &[usize]) -> Option<Dependence> {
         let all = self.dependence_of(MemoryOf::All, borders)?;
@@ -133,6 +133,12 @@ impl Solution {
             share: 0.0,
             level: 1.0,
         };
+        let most = most_bias(&samples, c.nrows());
+        found.lag_one = (seen[1].max(0.0) + most) / expected[1];
+        found.z = found.lag_one * expected[1].sqrt();
+        if !found.is_significant() {
+            return Some(found);
+        }
         for round in 0..ROUNDS {
             let bias = bias(&samples, &c, found.share, found.decay);
             // κ from lag 0, then γ_l = (seen / κ − bias) / T
@@ -261,6 +267,10 @@ fn lag_traces(samples: &[Scaled]) -> [f64; LAGS + 1] {
                 .sum::<f64>();
             return;
         }
+        if a.keys == b.keys && a.keys.iter().all(Option::is_some) {
+            out[lag] += a.w.dot(&b.w);
+            return;
+        }
         let pairs: Vec<(usize, usize)> = shared(a, b).collect();
         for &(i, p) in &pairs {
             for &(j, q) in &pairs {
@@ -340,6 +350,18 @@ impl Memory {
         }
         own
     }
+}
+
+/// What the last three terms of (3) are at most without memory, at any lag:
+///
+/// ```text
+/// Σ |k_s C k_tᵀ| ≤ Σ_s tr(k_s C k_sᵀ) ≤ max|W| tr(C Σ JᵀV⁻¹J) ≤ max|W| n
+/// ```
+fn most_bias(samples: &[Scaled], unknowns: usize) -> f64 {
+    // The largest sum of a row is no less than the largest eigenvalue.
+    let of = |w: &DMatrix<f64>| w.column_iter().map(|c| c.lp_norm(1)).fold(0.0, f64::max);
+    let largest = samples.iter().map(|s| of(&s.w)).fold(0.0, f64::max);
+    largest * unknowns as f64
 }
 
 /// The last three terms of (3), by lag.

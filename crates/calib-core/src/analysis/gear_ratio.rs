@@ -22,7 +22,6 @@ use crate::graph::axis::Axis;
 use crate::graph::edge::EdgeKind;
 use crate::graph::effect::{EffectKind, Source};
 use crate::graph::ids::EdgeId;
-use crate::solve::equations::Workspace;
 use crate::solve::whitened::covariance_of;
 
 /// Turns of a motor per turn of its joint, found from the joint's errors.
@@ -121,22 +120,21 @@ impl Solution {
             .iter()
             .map(|joint| Scan::new(self, *joint, excess))
             .collect();
-        let mut work = Workspace::new(&self.model);
-        work.cache.update(&self.model.problem, &self.values);
-        self.each_numbered_sample(&candidates, samples, &mut work, |sample, s, alpha| {
+        for seen in self.seen(&candidates, samples) {
+            let (s, alpha) = (&seen.rows, &seen.columns);
             // Rows of Lᵀ with C = LLᵀ: bᵀCb is the square of Lᵀb.
             let taken = s.a.times(&half);
             for (scan, u) in scans.iter_mut().zip(alpha.column_iter()) {
                 let square = u.norm_squared();
                 if square > 0.0 {
-                    scan.q.push(scan.reading[sample]);
+                    scan.q.push(scan.reading[seen.sample]);
                     scan.push.push(u.dot(&s.w));
                     scan.square.push(square);
                     scan.along.push(taken.tr_mul(&u));
                     scan.free.push(taken.tr_mul(&s.w));
                 }
             }
-        });
+        }
         Some(scans)
     }
 }

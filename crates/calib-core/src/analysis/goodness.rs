@@ -11,12 +11,13 @@
 //! variance that samples as clusters show: correlated residuals inside a sample cannot fake significance. If the
 //! stated noise is too small, z² is divided by χ²/dof.
 
+mod columns;
 mod directions;
 mod profile;
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector, Vector3, Vector6};
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -26,13 +27,11 @@ use crate::analysis::solution::Solution;
 use crate::graph::edge::EdgeKind;
 use crate::graph::effect::{Drives, EFFECTS, EffectKind, Source};
 use crate::graph::ids::EdgeId;
-use crate::model::cache::State;
 use crate::model::layout::Model;
-use crate::model::path::DRIVEN;
-use crate::solve::equations::{NormalEquations, Workspace};
+use crate::solve::equations::NormalEquations;
 use crate::solve::normal::add_prior;
-use crate::solve::rows::{dot, residual};
-use crate::solve::whitened::{Whitened, covariance_of, whitened};
+use crate::solve::whitened::covariance_of;
+use columns::Seen;
 
 /// What a score test asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
@@ -103,6 +102,9 @@ impl GoodnessOfFit {
     /// …and when it explains this share of χ²: smaller ones are real but do not matter.
     pub const RELEVANT: f64 = 0.02;
 }
+
+/// Numbers of whitened rows that are kept for a second look: 32 MB.
+const KEPT: usize = 1 << 22;
 
 /// What is regressed on.
 #[derive(Clone)]
@@ -232,15 +234,17 @@ impl Solution {
         looked_at: &LookedAt,
     ) -> Option<Vec<ScoreTest>> {
         let model = &self.model;
-        let mut work = Workspace::new(model);
-        work.cache.update(&model.problem, &self.values);
         let (n, count) = (model.free(), candidates.len());
         let mut u = DVector::zeros(count);
         let mut raw = vec![0.0; count];
         let mut b = DMatrix::zeros(n, count);
         let (mut h, mut g) = (DMatrix::zeros(n, n), DVector::zeros(n));
         let samples = &looked_at.samples;
-        self.each_sample(candidates, samples, &mut work, |s, alpha| {
+        // They are asked for twice.
+        let keep = samples.len() * model.whole.max_rows * (n + count) <= KEPT;
+        let mut kept = Vec::new();
+        for seen in self.seen(candidates, samples) {
+            let (s, alpha) = (&seen.rows, &seen.columns);
             for (k, own) in alpha.column_iter().enumerate() {
                 u[k] += own.dot(&s.w);
                 raw[k] += own.norm_squared();
@@ -250,7 +254,10 @@ impl Solution {
                 s.a.add_gram(1.0, &mut h);
                 s.a.add_transposed_vector(&s.w, &mut g);
             }
-        });
+            if keep {
+                kept.push(seen);
+            }
+        }
         // From the minimum of all samples to that of those looked at, U ← U + bᵀδ.
         let (c, step) = if looked_at.all {
             (covariance_of(&self.information.curvature(model))?, None)
@@ -267,7 +274,8 @@ impl Solution {
         // effect does not count as its own noise.
         let mut clusters = vec![0.0; count];
         let mut chi2 = 0.0;
-        self.each_sample(candidates, samples, &mut work, |s, alpha| {
+        let mut share = |seen: Seen| {
+            let (s, alpha) = (&seen.rows, &seen.columns);
             let left = alpha - s.a.times(&taken);
             let moved = step.as_ref().map(|step| &s.w + s.a.times_vector(step));
             let w = moved.as_ref().unwrap_or(&s.w);
@@ -276,7 +284,11 @@ impl Solution {
                 let share = own.dot(w) - u[k] / information[k] * own.norm_squared();
                 clusters[k] += share * share;
             }
-        });
+        };
+        match keep {
+            true => kept.into_iter().for_each(&mut share),
+            false => self.seen(candidates, samples).for_each(&mut share),
+        }
         let chi2 = if looked_at.all { self.chi2 } else { chi2 };
         let excess = (self.chi2 / self.degrees_of_freedom.max(1.0)).max(1.0);
         let tried = tries(candidates);
@@ -325,83 +337,6 @@ impl Solution {
         let c = covariance_of(&system)?;
         let step = -(&c * DVector::from_row_slice(&system.g));
         Some((c, step))
-    }
-
-    /// Calls `see` with the whitened rows of each of `samples` and the candidates' whitened columns L⁻¹a, side by side.
-    pub(crate) fn each_sample(
-        &self,
-        candidates: &[Candidate],
-        samples: &[usize],
-        work: &mut Workspace,
-        mut see: impl FnMut(&Whitened, &DMatrix<f64>),
-    ) {
-        self.each_numbered_sample(candidates, samples, work, |_, s, columns| see(s, columns));
-    }
-
-    /// The same with the number of the sample.
-    pub(crate) fn each_numbered_sample(
-        &self,
-        candidates: &[Candidate],
-        samples: &[usize],
-        work: &mut Workspace,
-        mut see: impl FnMut(usize, &Whitened, &DMatrix<f64>),
-    ) {
-        for &sample in samples {
-            let Some(s) = whitened(self.objective(), &self.values, sample, work) else {
-                continue;
-            };
-            let columns = self.effect_rows(candidates, sample, &s.blocks, s.w.len(), work);
-            see(sample, &s, &(&s.l_inverse * columns));
-        }
-    }
-
-    /// a of equation (1) for every candidate at one sample.
-    pub(crate) fn effect_rows(
-        &self,
-        candidates: &[Candidate],
-        sample: usize,
-        blocks: &[(usize, usize, usize)],
-        rows: usize,
-        work: &Workspace,
-    ) -> DMatrix<f64> {
-        let model = &self.model;
-        let mut out = DMatrix::zeros(rows, candidates.len());
-        let mut twists = Vec::new();
-        let mut measurement = usize::MAX;
-        let mut pose = crate::model::pose::Pose::identity();
-        for &(o, first, count) in blocks {
-            let observation = model.observations[o];
-            if observation.measurement != measurement {
-                measurement = observation.measurement;
-                let at = State::new(&model.problem, &work.cache, &self.values);
-                pose = model.paths[measurement].effects(at, sample, &mut twists);
-            }
-            let jacobian = residual(model, &self.values, measurement, observation.item, &pose);
-            for (k, candidate) in candidates.iter().enumerate() {
-                let twist = match &candidate.effect {
-                    Effect::Joints(parts) => parts
-                        .iter()
-                        .flat_map(|(edge, drives, values)| {
-                            let which = DRIVEN.iter().position(|d| d == drives).unwrap_or(0);
-                            twists
-                                .iter()
-                                .filter(move |(e, _)| e == edge)
-                                .map(move |(_, t)| t[which] * values[sample])
-                        })
-                        .sum::<Vector6<f64>>(),
-                    Effect::Drift(axis, values) => {
-                        let mut e = Vector3::zeros();
-                        e[*axis] = values[sample];
-                        let v = pose.r.tr_mul(&e);
-                        Vector6::new(0.0, 0.0, 0.0, v.x, v.y, v.z)
-                    }
-                };
-                for i in 0..count {
-                    out[(first + i, k)] = dot(&jacobian.m[i], &twist);
-                }
-            }
-        }
-        out
     }
 }
 

@@ -24,6 +24,7 @@ use crate::model::values::Values;
 use crate::solve::chunks::{chunked, is_one_chunk};
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::rows::SampleRows;
+use crate::solve::structured::RandomPart;
 use crate::solve::whitened::lower_inverse;
 
 /// A direction whose singular value is below this fraction of the largest is a gauge: rounding
@@ -134,7 +135,8 @@ pub struct Information {
     pub(crate) r: DMatrix<f64>,
 }
 
-/// The triangular factor of a part's rows of some samples, columns in units of `scale`, those of the part.
+/// The triangular factor of a part's rows of some samples, columns in units of `scale`, those of the part. Where the places of markers on their bodies
+/// are known, six rows of each body hold all of it.
 fn factor_of(
     objective: Objective,
     at: State,
@@ -148,20 +150,31 @@ fn factor_of(
         theta,
     } = objective;
     let mut rows = SampleRows::of(model, part);
+    let mut random = RandomPart::default();
     let n = rows.n;
     let mut qr = StreamedQr::new(n);
-    let mut scaled = vec![0.0; n];
+    let (mut whitened, mut scaled) = (vec![0.0; part.max_rows * n], vec![0.0; n]);
+    let mut known = true;
     for sample in samples {
-        rows.fill(model, at, weights, sample, Derivatives::All);
-        if rows.m == 0 {
+        if known {
+            rows.fill_turned(model, at, (weights, theta), sample, |rest| {
+                known &= rest.own.is_empty();
+            });
+        }
+        if !known {
+            rows.fill(model, at, weights, sample, Derivatives::All);
+        }
+        let m = rows.m;
+        if m == 0 {
             continue;
         }
-        rows.covariance(model, weights, theta);
-        rows.factor()?;
-        rows.whiten(true);
-        for i in 0..rows.m {
-            for c in 0..n {
-                scaled[c] = rows.j[i * n + c] * scale[part.columns[c]];
+        rows.whiten_blocks(model, weights, theta, true)?;
+        rows.random_part(&mut random)?;
+        let whitened = &mut whitened[..m * n];
+        random.whiten_rows(&rows.j[..m * n], n, whitened);
+        for row in whitened.chunks_exact(n.max(1)) {
+            for (c, x) in row.iter().enumerate() {
+                scaled[c] = x * scale[part.columns[c]];
             }
             qr.append(&scaled);
         }

@@ -115,19 +115,18 @@ impl Solution {
         let value = |p: &Piece| self.values.0[self.model.columns[p.column]];
         let values: Vec<f64> = pieces.iter().map(value).collect();
         let excess = (self.chi2 / self.degrees_of_freedom.max(1.0)).max(1.0);
-        let mut work = Workspace::new(&self.model);
-        work.cache.update(&self.model.problem, &self.values);
         let mut out = all.clone();
-        all.each_numbered_sample(&candidates, &wanted, &mut work, |sample, s, d| {
+        for seen in all.seen(&candidates, &wanted) {
+            let (s, d) = (&seen.rows, &seen.columns);
             let sides: f64 = (0..values.len())
                 .map(|k| d.column(k).norm() * values[k].abs())
                 .sum();
             let noise = (GROSS * excess * s.w.len() as f64).sqrt();
             if s.w.norm() > REACH * sides + noise {
-                let own = self.model.of_sample[sample].clone();
+                let own = self.model.of_sample[seen.sample].clone();
                 out.weights[own.clone()].copy_from_slice(&self.weights[own]);
             }
-        });
+        }
         out
     }
 
@@ -223,15 +222,13 @@ impl Free {
     fn new(solution: &Solution, pieces: &[Piece]) -> Option<Self> {
         let model = &solution.model;
         let (n, count) = (model.free(), pieces.len());
-        let mut work = Workspace::new(model);
-        work.cache.update(&model.problem, &solution.values);
         let (mut h, mut g) = (DMatrix::zeros(n, n), DVector::zeros(n));
         let mut ad = DMatrix::zeros(n, count);
         let mut dd = DMatrix::zeros(count, count);
         let mut dw = DVector::zeros(count);
         let mut squares = 0.0;
         let candidates: Vec<Candidate> = pieces.iter().map(|p| p.candidate.clone()).collect();
-        solution.each_sample(&candidates, &solution.used_samples(), &mut work, |s, d| {
+        solution.each_sample(&candidates, &solution.used_samples(), |s, d| {
             s.a.add_gram(1.0, &mut h);
             s.a.add_transposed_vector(&s.w, &mut g);
             s.a.add_transposed_times(1.0, d, &mut ad);

@@ -222,10 +222,10 @@ impl Solution {
         let (mut cost, mut rows) = (0.0, 0.0);
         let mut work = Workspace::new(model);
         work.cache.update(&model.problem, &self.values);
-        let inner = work.clone();
         let samples = self.looked_at().samples;
-        self.each_numbered_sample(effects, &samples, &mut work, |number, s, alpha| {
-            let b = self.columns_at(changes, columns, &ranges, (number, s, alpha), &inner);
+        for seen in self.seen(effects, &samples) {
+            let (s, at) = (&seen.rows, (seen.sample, &seen.rows, &seen.columns));
+            let b = self.columns_at(changes, columns, &ranges, at, &work);
             s.a.add_gram(1.0, &mut h);
             s.a.add_transposed_vector(&s.w, &mut g);
             s.a.add_transposed_times(1.0, &b, &mut e);
@@ -233,7 +233,7 @@ impl Solution {
             u += b.tr_mul(&s.w);
             cost += s.w.norm_squared();
             rows += s.w.len() as f64;
-        });
+        }
         let mut system = NormalEquations::of(&h, &g);
         add_prior(model, &self.values, &mut system);
         let parameters = model.columns.iter().map(|p| &model.problem.parameters[*p]);

@@ -322,12 +322,7 @@ impl Design {
 
     /// The set of the largest Δ for given cumulative sums of U: the best test of every recording, with other recordings
     /// moved to the other side as long as that helps.
-    pub(super) fn best(
-        &self,
-        candidate: usize,
-        tests: &[Test],
-        u: &DMatrix<f64>,
-    ) -> Option<Found> {
+    pub(super) fn best(&self, candidate: usize, tests: &[Test], u: &DMatrix<f64>) -> Option<Found> {
         let mut of_part: Vec<Option<(f64, &Test)>> = vec![None; self.parts.len() - 1];
         // Many tests of few columns: memory is taken once.
         let mut own = vec![0.0; self.columns[candidate].len()];

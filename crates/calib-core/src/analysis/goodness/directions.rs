@@ -15,7 +15,6 @@ use nalgebra::{DMatrix, DVector};
 use super::{Candidate, Effect, Physics};
 use crate::analysis::solution::Solution;
 use crate::graph::problem::StartChange;
-use crate::solve::equations::Workspace;
 use crate::solve::whitened::covariance_of;
 
 /// Starts whose directions are tried; with more of them, those of most samples.
@@ -149,14 +148,12 @@ impl Solution {
     fn between(&self, columns: &[Candidate]) -> Option<(DVector<f64>, DMatrix<f64>)> {
         let model = &self.model;
         let (n, count) = (model.free(), columns.len());
-        let mut work = Workspace::new(model);
-        work.cache.update(&model.problem, &self.values);
         let mut u = DVector::zeros(count);
         let mut raw = DMatrix::zeros(count, count);
         let mut b = DMatrix::zeros(n, count);
         let (mut h, mut g) = (DMatrix::zeros(n, n), DVector::zeros(n));
         let looked_at = self.looked_at();
-        self.each_sample(columns, &looked_at.samples, &mut work, |s, alpha| {
+        self.each_sample(columns, &looked_at.samples, |s, alpha| {
             let transposed = alpha.transpose();
             u += &transposed * &s.w;
             raw.gemm(1.0, &transposed, alpha, 1.0);

@@ -13,7 +13,7 @@ use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 use super::Candidate;
 use crate::analysis::less_noise::{Level, profiled};
 use crate::analysis::solution::Solution;
-use crate::solve::equations::{NormalEquations, Workspace};
+use crate::solve::equations::NormalEquations;
 use crate::solve::normal::add_prior;
 use crate::solve::whitened::covariance_of;
 
@@ -69,14 +69,12 @@ impl Solution {
     fn level(&self, candidates: &[Candidate], used: &[usize]) -> Option<(Level, f64, Vec<Taken>)> {
         let model = &self.model;
         let (n, count) = (model.free(), candidates.len());
-        let mut work = Workspace::new(model);
-        work.cache.update(&model.problem, &self.values);
         let mut h = DMatrix::zeros(n, n);
         let mut g = DVector::zeros(n);
         let mut b = DMatrix::zeros(n, count);
         let (mut u, mut raw) = (vec![0.0; count], vec![0.0; count]);
         let (mut cost, mut rows, mut log_det) = (0.0, 0.0, 0.0);
-        self.each_sample(candidates, used, &mut work, |s, alpha| {
+        self.each_sample(candidates, used, |s, alpha| {
             s.a.add_gram(1.0, &mut h);
             s.a.add_transposed_vector(&s.w, &mut g);
             s.a.add_transposed_times(1.0, alpha, &mut b);

@@ -175,7 +175,9 @@ impl Design {
             us[k].axpy(factor, &seen.bw.rows_range(columns.clone()), 1.0);
             let ab = seen.ab.columns_range(columns.clone());
             sums[k].f.zip_apply(&ab, |sum, x| *sum += factor * x);
-            sums[k].g.zip_apply(bb, |sum, x| *sum += factor * factor * x);
+            sums[k]
+                .g
+                .zip_apply(bb, |sum, x| *sum += factor * factor * x);
         }
         self.kept.extend(seen.kept);
     }
