@@ -9,6 +9,7 @@
 //! R comes from QR block by block over the samples: JᵀWJ would lose every direction below 1e-8 of the
 //! strongest, and those are the ones that matter here.
 
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 
@@ -19,7 +20,6 @@ use calib_geometry::decompose;
 use crate::model::cache::State;
 use crate::model::layout::Model;
 use crate::model::parts::Part;
-use crate::model::path::Derivatives;
 use crate::model::values::Values;
 use crate::solve::chunks::{chunked, is_one_chunk};
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
@@ -135,8 +135,10 @@ pub struct Information {
     pub(crate) r: DMatrix<f64>,
 }
 
-/// The triangular factor of a part's rows of some samples, columns in units of `scale`, those of the part. Where the places of markers on their bodies
-/// are known, six rows of each body hold all of it.
+/// The triangular factor of a part's rows of some samples, columns in units of `scale`, those of the part.
+///
+/// Of the markers of a body six rows say all of its motion. What the others say of the markers' own places is the same as long as the same markers are
+/// seen, and is taken once with its count.
 fn factor_of(
     objective: Objective,
     at: State,
@@ -154,16 +156,28 @@ fn factor_of(
     let n = rows.n;
     let mut qr = StreamedQr::new(n);
     let (mut whitened, mut scaled) = (vec![0.0; part.max_rows * n], vec![0.0; n]);
-    let mut known = true;
+    let mut append = |qr: &mut StreamedQr, rows: &[f64], factor: f64| {
+        for row in rows.chunks_exact(n.max(1)) {
+            for (c, x) in row.iter().enumerate() {
+                scaled[c] = x * scale[part.columns[c]] * factor;
+            }
+            qr.append(&scaled);
+        }
+    };
+    let mut rests: BTreeMap<usize, Counted> = BTreeMap::new();
     for sample in samples {
-        if known {
-            rows.fill_turned(model, at, (weights, theta), sample, |rest| {
-                known &= rest.own.is_empty();
-            });
-        }
-        if !known {
-            rows.fill(model, at, weights, sample, Derivatives::All);
-        }
+        rows.fill_turned(model, at, (weights, theta), sample, |rest| {
+            let counted = rests.entry(rest.measurement).or_default();
+            if counted.turn != rest.turn {
+                append(&mut qr, &counted.rows, counted.count.sqrt());
+                *counted = Counted {
+                    turn: rest.turn,
+                    count: 0.0,
+                    rows: rest.jacobian(n),
+                };
+            }
+            counted.count += 1.0;
+        });
         let m = rows.m;
         if m == 0 {
             continue;
@@ -172,14 +186,20 @@ fn factor_of(
         rows.random_part(&mut random)?;
         let whitened = &mut whitened[..m * n];
         random.whiten_rows(&rows.j[..m * n], n, whitened);
-        for row in whitened.chunks_exact(n.max(1)) {
-            for (c, x) in row.iter().enumerate() {
-                scaled[c] = x * scale[part.columns[c]];
-            }
-            qr.append(&scaled);
-        }
+        append(&mut qr, whitened, 1.0);
+    }
+    for counted in rests.into_values() {
+        append(&mut qr, &counted.rows, counted.count.sqrt());
     }
     Some(qr.finish())
+}
+
+/// Rows that so many samples have in common.
+#[derive(Default)]
+struct Counted {
+    turn: usize,
+    count: f64,
+    rows: Vec<f64>,
 }
 
 /// R over all columns, from that of each part.

@@ -134,7 +134,7 @@ impl SampleRows {
                 first,
                 r: pose.r,
             });
-            rest(&turn.rest(group));
+            rest(&turn.rest(measurement, group));
         }
     }
 

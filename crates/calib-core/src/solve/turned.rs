@@ -39,6 +39,9 @@ pub(crate) struct Own {
 
 /// Equation (2) of one sample.
 pub(crate) struct Rest<'a> {
+    pub measurement: usize,
+    /// The same while Q and B are.
+    pub turn: usize,
     pub group: usize,
     /// 3M − 6.
     pub rows: usize,
@@ -49,9 +52,26 @@ pub(crate) struct Rest<'a> {
     pub gradient: &'a [f64],
     /// Bᵀ(I − QQᵀ)B, p × p.
     gram: &'a [f64],
+    q: &'a [[f64; 6]],
 }
 
 impl Rest<'_> {
+    /// (I − QQᵀ)B, 3M rows of n columns one after the other, none where no coordinate is unknown.
+    pub(crate) fn jacobian(&self, n: usize) -> Vec<f64> {
+        if self.own.is_empty() {
+            return Vec::new();
+        }
+        let mut out = vec![0.0; self.q.len() * n];
+        for (row, (out, q)) in out.chunks_exact_mut(n).zip(self.q).enumerate() {
+            for own in self.own {
+                let unit = if own.row == row { 1.0 } else { 0.0 };
+                let taken: f64 = q.iter().zip(&self.q[own.row]).map(|(a, b)| a * b).sum();
+                out[own.column] += own.scale * (unit - taken);
+            }
+        }
+        out
+    }
+
     /// Adds Bᵀ(I − QQᵀ)B to a matrix over all columns.
     pub(crate) fn add_gram(&self, h: &mut DMatrix<f64>) {
         let p = self.own.len();
@@ -66,6 +86,8 @@ impl Rest<'_> {
 /// Q, U and what follows from them, and the residual of one sample.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Turned {
+    /// How often Q was found.
+    turns: usize,
     /// (point, s) and place of every marker that was seen.
     seen: Vec<(usize, f64)>,
     places: Vec<Vector3<f64>>,
@@ -152,6 +174,7 @@ impl Turned {
                 }
             }
         }
+        self.turns += 1;
         let qr = a.qr();
         let (q, u) = (qr.q(), qr.r());
         self.q.clear();
@@ -202,14 +225,17 @@ impl Turned {
     }
 
     /// Equation (2) of the sample that was seen last.
-    pub(crate) fn rest(&self, group: usize) -> Rest<'_> {
+    pub(crate) fn rest(&self, measurement: usize, group: usize) -> Rest<'_> {
         Rest {
+            measurement,
+            turn: self.turns,
             group,
             rows: self.left.len() - 6,
             cost: self.cost,
             own: &self.own,
             gradient: &self.gradient,
             gram: &self.gram,
+            q: &self.q,
         }
     }
 

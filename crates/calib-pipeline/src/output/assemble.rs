@@ -2,8 +2,8 @@
 
 use calib_profile::Method;
 use calib_report::{
-    HeldOut, Identification, Input, MissingPhysics, NextStep, Report, Residuals, Scope, Verdict,
-    Verification, judge,
+    DataInformation, DhTable, HeldOut, Identification, Input, MissingPhysics, NextStep, Report,
+    Residuals, Scope, Verdict, Verification, WeakDirections, Workspace, judge,
 };
 
 use crate::formulate::formulation::MlFit;
@@ -32,20 +32,12 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
     let profile = &e.inputs.robot.profile;
     let file = &e.inputs.robot.file;
     let goodness = e.causes.goodness.as_ref();
-    let ((workspace, weak), (information, dh_table)) = rayon::join(
-        || {
-            rayon::join(
-                || e.fit.and_then(|fit| workspace(e.inputs, fit)),
-                || e.fit.and_then(|fit| weak_directions(e.inputs, fit)),
-            )
-        },
-        || {
-            rayon::join(
-                || e.fit.map(|fit| data_information(e.inputs, fit)),
-                || e.fit.and_then(|fit| dh_table(e.inputs, fit)),
-            )
-        },
-    );
+    let Longest {
+        workspace,
+        weak,
+        information,
+        dh_table,
+    } = longest(e);
     let missing: Vec<MissingPhysics> = goodness
         .iter()
         .flat_map(|g| &g.missing)
@@ -131,6 +123,37 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         ..Report::default()
     };
     report.judged(judgment)
+}
+
+/// What takes longest.
+struct Longest {
+    workspace: Option<Workspace>,
+    weak: Option<WeakDirections>,
+    information: Option<DataInformation>,
+    dh_table: Option<DhTable>,
+}
+
+fn longest(e: &Evidence<'_>) -> Longest {
+    let ((workspace, weak), (information, dh_table)) = rayon::join(
+        || {
+            rayon::join(
+                || e.fit.and_then(|fit| workspace(e.inputs, fit)),
+                || e.fit.and_then(|fit| weak_directions(e.inputs, fit)),
+            )
+        },
+        || {
+            rayon::join(
+                || e.fit.map(|fit| data_information(e.inputs, fit)),
+                || e.fit.and_then(|fit| dh_table(e.inputs, fit)),
+            )
+        },
+    );
+    Longest {
+        workspace,
+        weak,
+        information,
+        dh_table,
+    }
 }
 
 fn residuals(e: &Evidence<'_>) -> Residuals {

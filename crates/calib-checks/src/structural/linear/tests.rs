@@ -24,7 +24,8 @@ fn data() -> Data {
         offset: 0.0,
     };
     let joints = [(0, 0), (1, 1), (2, 0), (3, 3)].map(joint);
-    let rows = 20;
+    // More than one piece.
+    let rows = 70;
     let body = |(b, link): (usize, usize)| {
         let marker = |i: usize, m: usize| {
             let at = 7 * i + 300 * m + 100 * b;
@@ -43,7 +44,7 @@ fn data() -> Data {
         readings: (0..rows)
             .map(|i| (0..4).map(|j| Some(drawn(31 * i + j))).collect())
             .collect(),
-        recording: (0..rows).map(|i| RecordingIndex(i / 10)).collect(),
+        recording: (0..rows).map(|i| RecordingIndex(i / 35)).collect(),
         rates: (0..rows)
             .map(|i| Some((0..4).map(|j| drawn(17 * i + j)).collect()))
             .collect(),
@@ -52,7 +53,7 @@ fn data() -> Data {
 }
 
 #[test]
-fn groups_sum_to_what_all_bodies_in_one_give() {
+fn groups_and_pieces_sum_to_what_all_bodies_in_one_give() {
     let data = data();
     let pairs = (0..4).flat_map(|j| (0..4).map(move |s| (JointIndex(j), JointIndex(s))));
     let mut tests: Vec<Test> = pairs
@@ -64,7 +65,7 @@ fn groups_sum_to_what_all_bodies_in_one_give() {
     assert_eq!(groups(&model).len(), 3);
     let whole = group_of(&model, vec![0, 1, 2]);
     let lambdas = [0.0, 0.7];
-    let in_one = model.sums_of_group(&whole, lambdas);
+    let in_one = model.sums_of_group(&whole, 0..70, lambdas);
     for (own, one) in model.sums_of(lambdas).iter().zip(&in_one) {
         let p = one.gram.ncols() - 1;
         // Products of the residual with the columns are there once.
