@@ -20,7 +20,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use crate::analysis::estimate::{Start, refit};
+use crate::analysis::refit::{Start, refit};
 use crate::analysis::settings::Settings;
 use crate::analysis::solution::Solution;
 use crate::model::cache::State;

@@ -178,59 +178,17 @@ fn solve_of(
     finish(model, found.minimum, outcome)
 }
 
-/// Where a fit begins that keeps the observations it is given.
-pub(crate) struct Start {
-    pub values: Values,
-    /// Robust weight per observation.
-    pub weights: Vec<f64>,
-    /// σ² per group.
-    pub theta: Vec<f64>,
-    /// Linearizations until here.
-    pub iterations: usize,
-}
-
-/// Given observations fitted again under another statement of the same problem: the same measurements and parameters,
-/// other noise or other priors.
-pub(crate) fn refit(
-    problem: &Problem,
-    start: Start,
-    settings: &Settings,
-) -> Result<Solution, Error> {
-    let Start {
-        values,
-        weights,
-        mut theta,
-        iterations,
-    } = start;
-    let model = Model::new(problem)?;
-    let mask: Vec<f64> = model
-        .observations
-        .iter()
-        .map(|o| f64::from(u8::from(!model.is_held_out(o.sample))))
-        .collect();
-    let mut work = Workspace::new(&model);
-    let mut fit = Fit::new(&model, settings, FULL, iterations);
-    let minimum = fit.with_noise(&values, &weights, &mut theta, &mut work);
-    let found = Found {
-        minimum,
-        weights,
-        theta,
-    };
-    let outcome = fit.outcome(&found, &mask, &mut work);
-    finish(model, found.minimum, outcome)
-}
-
 /// Where a fit ended.
-struct Found {
-    minimum: Minimum,
-    weights: Vec<f64>,
-    theta: Vec<f64>,
+pub(super) struct Found {
+    pub minimum: Minimum,
+    pub weights: Vec<f64>,
+    pub theta: Vec<f64>,
 }
 
 /// What [`finish`] only passes on.
-struct Outcome {
-    weights: Vec<f64>,
-    theta: Vec<f64>,
+pub(super) struct Outcome {
+    pub weights: Vec<f64>,
+    pub theta: Vec<f64>,
     rejected: Vec<Rejection>,
     iterations: usize,
     relative_sigma: Vec<Option<f64>>,
@@ -241,7 +199,7 @@ struct Outcome {
 /// then has no minimum nearby.
 const MOST_ITERATIONS: usize = 500;
 
-struct Fit<'a> {
+pub(super) struct Fit<'a> {
     model: &'a Model,
     settings: &'a Settings,
     precision: Precision,
@@ -250,7 +208,7 @@ struct Fit<'a> {
 }
 
 impl<'a> Fit<'a> {
-    fn new(
+    pub(super) fn new(
         model: &'a Model,
         settings: &'a Settings,
         precision: Precision,
@@ -277,7 +235,7 @@ impl<'a> Fit<'a> {
     }
 
     /// What the result needs beside the minimum.
-    fn outcome(&self, found: &Found, mask: &[f64], work: &mut Workspace) -> Outcome {
+    pub(super) fn outcome(&self, found: &Found, mask: &[f64], work: &mut Workspace) -> Outcome {
         let Found {
             minimum,
             weights,
@@ -410,7 +368,7 @@ impl<'a> Fit<'a> {
     }
 
     /// Values and noise levels in turn until both stay.
-    fn with_noise(
+    pub(super) fn with_noise(
         &mut self,
         start: &Values,
         weights: &[f64],
@@ -453,7 +411,7 @@ impl<'a> Fit<'a> {
 }
 
 /// Spectrum, covariance and observability at the minimum.
-fn finish(model: Model, minimum: Minimum, outcome: Outcome) -> Result<Solution, Error> {
+pub(super) fn finish(model: Model, minimum: Minimum, outcome: Outcome) -> Result<Solution, Error> {
     let Outcome {
         weights,
         theta,

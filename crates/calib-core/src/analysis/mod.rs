@@ -20,6 +20,7 @@ pub(crate) mod observability;
 mod own_levels;
 mod posture;
 mod precision;
+pub(crate) mod refit;
 pub(crate) mod sandwich;
 pub(crate) mod score;
 pub(crate) mod scores;

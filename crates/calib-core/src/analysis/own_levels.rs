@@ -16,18 +16,20 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use calib_geometry::statistics::median;
 
-use crate::analysis::estimate::{Start, refit, solve};
+use crate::analysis::estimate::solve;
+use crate::analysis::refit::{Start, refitted};
 use crate::analysis::scores::{Scores, mean, paired};
 use crate::analysis::settings::Settings;
 use crate::analysis::solution::Solution;
-use crate::analysis::validate::VectorError;
+use crate::analysis::validate::{VectorError, predictions};
 use crate::graph::ids::PointId;
 use crate::graph::measurement::MeasurementKind;
 use crate::graph::problem::OwnNoise;
 use crate::model::cache::State;
 use crate::model::layout::Observation;
 use crate::model::path::Derivatives;
-use crate::solve::equations::Workspace;
+use crate::model::values::Values;
+use crate::solve::equations::{Objective, Workspace};
 
 /// Poses that are left out in turn at most, evenly over all.
 const POSES: usize = 200;
@@ -166,16 +168,23 @@ impl Solution {
             theta: own.levels(&self.theta),
             iterations: self.iterations,
         };
-        let found = refit(&own.problem, start, settings).ok()?;
+        let found = refitted(&own.problem, start, settings).ok()?;
         let step = self.model.problem().samples().div_ceil(POSES).max(1);
-        let left_out = |of: &Self| of.leave_out(|sample| sample.is_multiple_of(step));
-        let (own, common) = rayon::join(|| left_out(&found), || left_out(self));
+        let left_out = |objective: Objective, values: &Values| {
+            let wanted = |sample: usize| sample.is_multiple_of(step);
+            predictions(objective, values, objective.weights, true, &wanted)
+        };
+        let (own, common) = rayon::join(
+            || left_out(found.objective(), found.values()),
+            || left_out(self.objective(), &self.values),
+        );
         let (own, common) = (own?, common?);
         let scores = Scores::of(&[&own, &common]);
         let (less, error) = paired(&scores.surprises[1], &scores.surprises[0]);
         let ratio = (mean(&scores.squares[0]) / mean(&scores.squares[1])).sqrt();
         let enough = scores.squares[0].len() >= FEWEST;
-        (enough && less > SHOWN * error && ratio <= SAME).then_some(found)
+        let better = enough && less > SHOWN * error && ratio <= SAME;
+        better.then(|| found.finished().ok()).flatten()
     }
 
     /// q of every marker at every pose, per measurement of three markers and more whose noise is in question.

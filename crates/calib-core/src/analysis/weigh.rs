@@ -29,8 +29,8 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::analysis::admit::{
     Admission, eligible, is_harmed, left_out_squares, many_rejected, touched, wider,
 };
-use crate::analysis::estimate::{Start, refit};
 use crate::analysis::looked_at::thinned;
+use crate::analysis::refit::{Start, refit};
 use crate::analysis::scores::{Scores, mean, paired};
 use crate::analysis::settings::Settings;
 use crate::analysis::solution::Solution;

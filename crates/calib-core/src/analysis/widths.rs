@@ -21,8 +21,8 @@ use serde::{Deserialize, Serialize};
 
 use calib_geometry::decompose::{semidefinite_eigen, solve_least_squares};
 
-use crate::analysis::estimate::{Start, refit};
 use crate::analysis::information::Information;
+use crate::analysis::refit::{Start, refit};
 use crate::analysis::scores::{Scores, mean};
 use crate::analysis::settings::Settings;
 use crate::analysis::solution::{Solution, describe_parameters};
