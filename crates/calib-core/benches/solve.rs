@@ -8,6 +8,10 @@ mod common;
 use calib_core::{ChangeSettings, MinimizeSettings, Model, NoiseKind, Settings, minimize, solve};
 use common::{Chain, Free, rng, six_r};
 
+// As in the program.
+#[global_allocator]
+static ALLOCATOR: mimalloc::MiMalloc = mimalloc::MiMalloc;
+
 /// Best of many runs: what the code costs on a machine that others use too.
 fn best_of(name: &str, runs: usize, mut f: impl FnMut()) {
     let best = (0..runs)
@@ -18,7 +22,7 @@ fn best_of(name: &str, runs: usize, mut f: impl FnMut()) {
         })
         .min()
         .unwrap_or_default();
-    println!("best of {runs}: {name}: {best:.1?}");
+    println!("best of {runs}: {name}: {best:.2?}");
 }
 
 fn six_r_with_1000_poses(c: &mut Criterion) {
@@ -120,9 +124,65 @@ fn long_recordings(_: &mut Criterion) {
     }
 }
 
+/// The same with joints that scatter.
+fn joint_noise(_: &mut Criterion) {
+    let mut r = rng(1);
+    let free = Free::frames_and_offsets(6);
+    let chain = Chain::nominal(six_r())
+        .posed(&mut r, 1000, 1.4)
+        .deviate(&mut r, &free, 0.01, 0.005);
+    let mut h = chain.problem(&free, 1e-4);
+    let noise = h
+        .problem
+        .noise_group("joints", NoiseKind::Joint, 1e-4, true);
+    for joint in h.joints.clone() {
+        h.problem.joint_noise(joint, noise);
+    }
+    chain.observe(&mut r, &mut h, 1e-4, 1e-4);
+    let model = Model::new(&h.problem).unwrap();
+    let weights = vec![1.0; model.observation_count()];
+    let theta = vec![1e-8; 2];
+    let start = model.start();
+    let mut once = MinimizeSettings::default();
+    once.max_iterations = 0;
+    once.decrement = 1e300;
+    let name = "joint noise: one linearization and one cost, 1000 poses x 4 markers";
+    best_of(name, 100, || {
+        std::hint::black_box(minimize(&model, &start, &weights, &theta, &once));
+    });
+}
+
+/// What grows with the unknowns: all six numbers of every joint's frame, with joints that scatter and without.
+fn unknowns(_: &mut Criterion) {
+    for arms in [1, 2, 4, 8, 16] {
+        let links: Vec<_> = (0..arms).flat_map(|_| six_r()).collect();
+        let mut r = rng(1);
+        let free = Free::everything(links.len());
+        let chain = Chain::nominal(links).posed(&mut r, 200, 1.4);
+        let mut h = chain.problem(&free, 1e-4);
+        let noise = h
+            .problem
+            .noise_group("joints", NoiseKind::Joint, 1e-4, true);
+        for joint in h.joints.clone() {
+            h.problem.joint_noise(joint, noise);
+        }
+        chain.observe(&mut r, &mut h, 1e-4, 1e-4);
+        let model = Model::new(&h.problem).unwrap();
+        let weights = vec![1.0; model.observation_count()];
+        let start = model.start();
+        let mut once = MinimizeSettings::default();
+        once.max_iterations = 0;
+        once.decrement = 1e300;
+        let name = format!("one linearization of {} unknowns", model.free());
+        best_of(&name, 20, || {
+            std::hint::black_box(minimize(&model, &start, &weights, &[1e-8; 2], &once));
+        });
+    }
+}
+
 criterion_group! {
     name = benches;
     config = Criterion::default().sample_size(20);
-    targets = six_r_with_1000_poses, long_recordings
+    targets = six_r_with_1000_poses, joint_noise, unknowns, long_recordings
 }
 criterion_main!(benches);

@@ -5,6 +5,9 @@ use nalgebra::{DMatrix, Dyn, MatrixView};
 /// Rows gathered before one matrix product: 64 to 96 rows fill the cache lines of the product's kernel.
 const PANEL: usize = 96;
 
+/// Of fewer columns H is one product.
+const FEW: usize = 48;
+
 /// H and g over some columns, and their share of the cost.
 pub(crate) struct Local {
     pub k: usize,
@@ -62,8 +65,11 @@ impl Local {
             Dyn(self.k),
             Dyn(1),
         );
-        // H is symmetric: of four blocks, three are multiplied and one is copied.
-        let (k, half) = (self.k, self.k / 2);
+        // H is symmetric: of four blocks, three are multiplied and one is copied. Of few columns it takes longer to prepare them thrice.
+        let (k, half) = match self.k {
+            k if k < FEW => (k, 0),
+            k => (k, k / 2),
+        };
         let mut product = |from: usize, count: usize, to: usize, width: usize| {
             let mut block = self.h.view_mut((from, to), (count, width));
             let left = rows.rows(from, count);
