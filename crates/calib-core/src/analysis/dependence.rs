@@ -190,11 +190,12 @@ impl Solution {
         });
         let added = &added + added.transpose();
         let mut out = self.clone();
-        let c = &self.information.covariance;
-        let more = c * added * c;
-        // Memory of both signs could in rare directions cancel: it is never taken for information.
-        let more = positive(&more);
-        out.information.covariance = (c + more) * dependence.level;
+        // C = R Rᵀ. Memory of both signs could in rare directions cancel: it is never taken for information. Which directions those are is asked in units of
+        // C: in those of the parameters, rounding would decide where it adds next to nothing.
+        let root = self.half_covariance();
+        let more = positive(&(root.transpose() * added * &root));
+        let more = &root * more * root.transpose();
+        out.information.covariance = (&self.information.covariance + more) * dependence.level;
         let described = describe_parameters(&out.model, &out.values, &out.information);
         for (parameter, described) in out.parameters.iter_mut().zip(described) {
             parameter.sigma = described.sigma;
@@ -436,23 +437,10 @@ fn bias_of_none(samples: &[Scaled], c: &DMatrix<f64>) -> [f64; LAGS + 1] {
 
 /// The positive part of a symmetric matrix.
 fn positive(m: &DMatrix<f64>) -> DMatrix<f64> {
-    // Scaled to a unit diagonal: radians and meters differ by orders.
-    let size = |i: usize| match m[(i, i)].abs().sqrt() {
-        size if size > 0.0 => size,
-        _ => 1.0,
-    };
-    let scale: Vec<f64> = (0..m.nrows()).map(size).collect();
-    let unit = DMatrix::from_fn(m.nrows(), m.nrows(), |i, j| {
-        0.5 * (m[(i, j)] + m[(j, i)]) / (scale[i] * scale[j])
-    });
-    let eigen = calib_geometry::decompose::symmetric_eigen(&unit);
+    let eigen = calib_geometry::decompose::symmetric_eigen(&((m + m.transpose()) * 0.5));
     let mut half = eigen.vectors.clone();
-    for k in 0..half.ncols() {
-        half.column_mut(k)
-            .scale_mut(eigen.values[k].max(0.0).sqrt());
+    for (mut column, value) in half.column_iter_mut().zip(eigen.values.iter()) {
+        column *= value.max(0.0).sqrt();
     }
-    let kept = &half * half.transpose();
-    DMatrix::from_fn(m.nrows(), m.nrows(), |i, j| {
-        kept[(i, j)] * scale[i] * scale[j]
-    })
+    &half * half.transpose()
 }

@@ -31,8 +31,12 @@ enum Seen {
 
 /// `poses` random poses; the noise of positions is an autoregression of first order by rows, along the axes of the tracker.
 fn case(seen: Seen, seed: u64, poses: usize, rho: f64) -> Case {
+    case_of(Free::everything(6), seen, (seed, 1.0), poses, rho)
+}
+
+/// The same with what is `known`, and lengths times a factor.
+fn case_of(free: Free, seen: Seen, (seed, factor): (u64, f64), poses: usize, rho: f64) -> Case {
     let mut r = rng(seed);
-    let free = Free::everything(6);
     let chain = Chain::nominal(six_r())
         .posed(&mut r, poses, 1.4)
         .deviate(&mut r, &free, 0.005, 0.002);
@@ -56,12 +60,12 @@ fn case(seen: Seen, seed: u64, poses: usize, rho: f64) -> Case {
             markers.push(calib_core::MarkerObservation {
                 sample,
                 point: h.points[m],
-                position: x * p + state[m] * SIGMA,
+                position: (x * p + state[m] * SIGMA) * factor,
                 shape: None,
             });
         }
         let turned = UnitQuaternion::from_scaled_axis(normal3(&mut r) * TURN);
-        let at = Translation3::from(x.translation.vector + state[0] * SIGMA);
+        let at = Translation3::from((x.translation.vector + state[0] * SIGMA) * factor);
         let pose = Isometry3::from_parts(at, x.rotation * turned);
         bodies.push(PoseObservation { sample, pose });
     }
@@ -177,4 +181,37 @@ fn borders_cut_the_memory() {
     let case = case(Seen::Markers, 1, 40, 0.9);
     let every: Vec<usize> = (1..40).collect();
     assert_eq!(case.solution.dependence(&every), None);
+}
+
+/// Robots that are known from their drawings in many directions: in some of these a memory adds next to nothing, of either sign.
+#[test]
+fn what_a_memory_adds_does_not_hang_on_rounding() {
+    let mut free = Free::everything(6);
+    free.prior = Some((0.01, 0.005));
+    let mut found = 0;
+    for (seed, seen) in (0..12).map(|seed| (seed, [Seen::Markers, Seen::Poses][seed as usize % 2]))
+    {
+        let sigmas = |factor: f64| {
+            let case = case_of(free.clone(), seen, (seed, factor), 14, 0.9);
+            let memory = case.solution.dependence(&[])?;
+            let under = case.solution.under(&memory, &[])?;
+            let significant = memory.is_significant();
+            Some((
+                significant,
+                under.parameters.iter().map(|p| p.sigma).collect::<Vec<_>>(),
+            ))
+        };
+        let (Some((significant, one)), Some((_, other))) = (sigmas(1.0), sigmas(1.0 + 1e-14))
+        else {
+            continue;
+        };
+        found += usize::from(significant);
+        for (k, (one, other)) in one.iter().zip(&other).enumerate() {
+            if let (Some(one), Some(other)) = (one, other) {
+                let off = (one / other - 1.0).abs();
+                assert!(off < 1e-7, "{seed}: {k}: {one:e} {other:e}");
+            }
+        }
+    }
+    assert!(found > 5, "{found}");
 }
