@@ -6,7 +6,7 @@ use criterion::{Criterion, criterion_group, criterion_main};
 mod common;
 
 use calib_core::{ChangeSettings, MinimizeSettings, Model, NoiseKind, Settings, minimize, solve};
-use common::{Chain, Free, rng, six_r};
+use common::{Chain, Free, Handles, rng, six_r};
 
 // As in the program.
 #[global_allocator]
@@ -23,6 +23,26 @@ fn best_of(name: &str, runs: usize, mut f: impl FnMut()) {
         .min()
         .unwrap_or_default();
     println!("best of {runs}: {name}: {best:.2?}");
+}
+
+/// One linearization and one cost.
+fn once() -> MinimizeSettings {
+    let mut once = MinimizeSettings::default();
+    once.max_iterations = 0;
+    once.decrement = 1e300;
+    once
+}
+
+/// The problem of a chain whose joints scatter.
+fn scattering(chain: &Chain, free: &Free) -> Handles {
+    let mut h = chain.problem(free, 1e-4);
+    let noise = h
+        .problem
+        .noise_group("joints", NoiseKind::Joint, 1e-4, true);
+    for joint in h.joints.clone() {
+        h.problem.joint_noise(joint, noise);
+    }
+    h
 }
 
 fn six_r_with_1000_poses(c: &mut Criterion) {
@@ -64,9 +84,7 @@ fn six_r_with_1000_poses(c: &mut Criterion) {
         ));
     });
     best_of("one linearization and one cost", 400, || {
-        let mut once = MinimizeSettings::default();
-        once.max_iterations = 0;
-        once.decrement = 1e300;
+        let once = once();
         std::hint::black_box(minimize(&model, &start, &weights, &theta, &once));
     });
     c.bench_function("full solve, 1000 poses x 4 markers", |b| {
@@ -101,14 +119,8 @@ fn long_recordings(_: &mut Criterion) {
         let chain = Chain::nominal(six_r())
             .posed(&mut r, poses, 1.4)
             .deviate(&mut r, &free, 0.01, 0.005);
-        let mut h = chain.problem(&free, 1e-4);
+        let mut h = scattering(&chain, &free);
         h.problem.group_mut(h.markers).estimate = true;
-        let noise = h
-            .problem
-            .noise_group("joints", NoiseKind::Joint, 1e-4, true);
-        for joint in h.joints.clone() {
-            h.problem.joint_noise(joint, noise);
-        }
         chain.observe(&mut r, &mut h, 1e-4, 1e-4);
         let settings = Settings::default();
         let solution = solve(&h.problem, &settings).unwrap();
@@ -131,21 +143,13 @@ fn joint_noise(_: &mut Criterion) {
     let chain = Chain::nominal(six_r())
         .posed(&mut r, 1000, 1.4)
         .deviate(&mut r, &free, 0.01, 0.005);
-    let mut h = chain.problem(&free, 1e-4);
-    let noise = h
-        .problem
-        .noise_group("joints", NoiseKind::Joint, 1e-4, true);
-    for joint in h.joints.clone() {
-        h.problem.joint_noise(joint, noise);
-    }
+    let mut h = scattering(&chain, &free);
     chain.observe(&mut r, &mut h, 1e-4, 1e-4);
     let model = Model::new(&h.problem).unwrap();
     let weights = vec![1.0; model.observation_count()];
     let theta = vec![1e-8; 2];
     let start = model.start();
-    let mut once = MinimizeSettings::default();
-    once.max_iterations = 0;
-    once.decrement = 1e300;
+    let once = once();
     let name = "joint noise: one linearization and one cost, 1000 poses x 4 markers";
     best_of(name, 100, || {
         std::hint::black_box(minimize(&model, &start, &weights, &theta, &once));
@@ -159,20 +163,12 @@ fn unknowns(_: &mut Criterion) {
         let mut r = rng(1);
         let free = Free::everything(links.len());
         let chain = Chain::nominal(links).posed(&mut r, 200, 1.4);
-        let mut h = chain.problem(&free, 1e-4);
-        let noise = h
-            .problem
-            .noise_group("joints", NoiseKind::Joint, 1e-4, true);
-        for joint in h.joints.clone() {
-            h.problem.joint_noise(joint, noise);
-        }
+        let mut h = scattering(&chain, &free);
         chain.observe(&mut r, &mut h, 1e-4, 1e-4);
         let model = Model::new(&h.problem).unwrap();
         let weights = vec![1.0; model.observation_count()];
         let start = model.start();
-        let mut once = MinimizeSettings::default();
-        once.max_iterations = 0;
-        once.decrement = 1e300;
+        let once = once();
         let name = format!("one linearization of {} unknowns", model.free());
         best_of(&name, 20, || {
             std::hint::black_box(minimize(&model, &start, &weights, &[1e-8; 2], &once));

@@ -413,27 +413,4 @@ impl Information {
 pub(crate) const INDETERMINATE: f64 = 1e-5;
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Against the inverse itself; where priors leave a direction open there is none.
-    #[test]
-    fn the_posterior_root_is_one_of_the_inverse() {
-        let n = 7;
-        let mut r = DMatrix::from_fn(n, n, |i, k| ((i * 31 + k * 17) as f64).sin());
-        r.fill_lower_triangle(0.0, 1);
-        for i in 0..n - 1 {
-            r[(i, i)] += 3.0;
-        }
-        r[(6, 6)] = 0.0;
-        let priors = [(2, 0.5), (6, 2.0)];
-        let mut information = r.tr_mul(&r);
-        for (c, weight) in priors {
-            information[(c, c)] += weight * weight;
-        }
-        let root = posterior_root(&r, &priors).expect("every direction is known");
-        let inverse = information.try_inverse().expect("regular");
-        assert!((&root * root.transpose() - &inverse).amax() < 1e-10 * inverse.amax());
-        assert!(posterior_root(&r, &[]).is_none());
-    }
-}
+mod tests;

@@ -1,0 +1,88 @@
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use super::*;
+use crate::graph::chart::Chart;
+use crate::solve::whitened::whitened;
+use crate::{Axis, MarkerObservation, NoiseKind, PointId, Problem};
+
+/// Unknown places of four markers, of which always others are hidden, behind two joints that scatter: the information of the whitened rows themselves.
+#[test]
+fn the_information_is_that_of_all_rows() {
+    const SAMPLES: usize = 70;
+    let mut p = Problem::new(SAMPLES);
+    let (tracker, base) = (p.frame("tracker"), p.frame("base"));
+    let x = Isometry3::new(Vector3::new(0.3, 0.1, 0.2), Vector3::new(0.2, -0.4, 0.5));
+    p.unknown("place", tracker, base, x, Chart::full());
+    let noise = p.noise_group("markers", NoiseKind::Position, 1e-3, true);
+    let mut frame = base;
+    for (k, axis) in [Vector3::z_axis(), Vector3::y_axis()]
+        .into_iter()
+        .enumerate()
+    {
+        let at = p.frame(&format!("at {k}"));
+        p.unknown(&format!("origin {k}"), frame, at, x, Chart::full());
+        frame = p.frame(&format!("link {k}"));
+        let turn = 1.3 + 0.4 * k as f64;
+        let q = (0..SAMPLES).map(|i| (turn * i as f64).sin()).collect();
+        let edge = p.joint(&format!("j{k}"), at, frame, Axis::Revolute(axis), q);
+        let group = p.noise_group(&format!("n{k}"), NoiseKind::Joint, 1e-3, true);
+        p.joint_noise(edge, group);
+    }
+    let place = |m: usize| Point3::from(Vector3::from_fn(|i, _| 0.1 * ((3 * m + i) as f64).sin()));
+    let points: Vec<PointId> = (0..4)
+        .map(|m| p.unknown_point(&format!("m{m}"), frame, place(m), Some(0.1)))
+        .collect();
+    let seen = (0..4 * SAMPLES).filter(|i| i % 7 != 0 && i % 11 > 1);
+    let seen = seen.map(|i| MarkerObservation {
+        sample: i / 4,
+        point: points[i % 4],
+        position: Point3::new(0.2, 0.1, 1e-3 * (1.9 * i as f64).sin()),
+        shape: None,
+    });
+    p.markers("body", tracker, frame, noise, seen.collect());
+    let model = Model::new(&p).unwrap();
+    let (values, theta) = (model.start(), [1e-6, 4e-6, 9e-6]);
+    let weights = vec![1.0; model.observations.len()];
+    let objective = Objective {
+        model: &model,
+        weights: &weights,
+        theta: &theta,
+    };
+    let mut work = Workspace::new(&model);
+    work.cache.update(&model.problem, &values);
+    let n = model.free();
+    let mut h = DMatrix::zeros(n, n);
+    for sample in 0..SAMPLES {
+        if let Some(rows) = whitened(objective, &values, sample, &mut work) {
+            rows.a.add_gram(1.0, &mut h);
+        }
+    }
+    let found = Information::at(&model, &values, &weights, &theta).expect("evaluable");
+    let r = DMatrix::from_fn(n, n, |i, j| found.r[(i, j)] / found.scale[j]);
+    let off = r.transpose() * &r - &h;
+    for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+        // Sums of some 200 rows in another order.
+        assert!(off[(i, j)].abs() <= 1e-12 * (h[(i, i)] * h[(j, j)]).sqrt());
+    }
+}
+
+/// Against the inverse itself; where priors leave a direction open there is none.
+#[test]
+fn the_posterior_root_is_one_of_the_inverse() {
+    let n = 7;
+    let mut r = DMatrix::from_fn(n, n, |i, k| ((i * 31 + k * 17) as f64).sin());
+    r.fill_lower_triangle(0.0, 1);
+    for i in 0..n - 1 {
+        r[(i, i)] += 3.0;
+    }
+    r[(6, 6)] = 0.0;
+    let priors = [(2, 0.5), (6, 2.0)];
+    let mut information = r.tr_mul(&r);
+    for (c, weight) in priors {
+        information[(c, c)] += weight * weight;
+    }
+    let root = posterior_root(&r, &priors).expect("every direction is known");
+    let inverse = information.try_inverse().expect("regular");
+    assert!((&root * root.transpose() - &inverse).amax() < 1e-10 * inverse.amax());
+    assert!(posterior_root(&r, &[]).is_none());
+}
