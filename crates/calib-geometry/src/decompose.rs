@@ -8,9 +8,13 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
+mod cholesky;
 mod jacobi;
+mod null_space;
 
+pub use cholesky::{cholesky_in_place, inverse_root, lower_inverse, solve_in_place};
 pub use jacobi::dot;
+pub use null_space::{NullSpace, null_space};
 use jacobi::{cyclic_jacobi, one_sided_jacobi};
 
 /// Thin singular value decomposition `A = U diag(s) Vᵀ`, singular values descending.
@@ -141,13 +145,7 @@ pub fn right_singular(a: &DMatrix<f64>) -> RightSingular {
             v: DMatrix::zeros(0, 0),
         };
     }
-    // Squares of very small numbers are 0, those of very large ones infinite.
-    let size = a.amax();
-    let scale = if size > 0.0 && size.is_finite() {
-        size
-    } else {
-        1.0
-    };
+    let scale = null_space::scale_of(a);
     let rows = row_factor(&(a / scale), f64::EPSILON * (n as f64).sqrt());
     let mut v = DMatrix::zeros(n, n);
     v.columns_mut(0, rows.nrows()).tr_copy_from(&rows);
@@ -260,52 +258,7 @@ pub fn pencil_eigen(d: &DMatrix<f64>, c: &DMatrix<f64>) -> Vec<PencilPair> {
 /// places. What remains below `relative_tolerance` times the longest column counts as nothing.
 #[must_use]
 pub fn row_factor(a: &DMatrix<f64>, relative_tolerance: f64) -> DMatrix<f64> {
-    let (m, n) = a.shape();
-    let mut work = a.clone();
-    let data = work.as_mut_slice();
-    // Columns that were not taken as pivots yet, in their order.
-    let mut left: Vec<usize> = (0..n).collect();
-    let mut longest = 0.0;
-    let mut reflector = vec![0.0; m];
-    let mut rank = 0;
-    while rank < m && !left.is_empty() {
-        let tail = |data: &[f64], c: usize| {
-            let tail = &data[c * m + rank..(c + 1) * m];
-            dot(tail, tail)
-        };
-        let (mut place, mut norm2) = (0, -1.0);
-        for (i, &c) in left.iter().enumerate() {
-            let of_column = tail(data, c);
-            if of_column > norm2 {
-                (place, norm2) = (i, of_column);
-            }
-        }
-        let norm = norm2.sqrt();
-        if rank == 0 {
-            longest = norm;
-        }
-        if norm <= relative_tolerance * longest || !norm.is_finite() {
-            break;
-        }
-        let pivot = left.remove(place);
-        // v = x ± ‖x‖ e₁,  x ← x − v (2 vᵀx / vᵀv)
-        let v = &mut reflector[rank..];
-        v.copy_from_slice(&data[pivot * m + rank..(pivot + 1) * m]);
-        let first = v[0];
-        let reflected = if first > 0.0 { -norm } else { norm };
-        v[0] -= reflected;
-        let half = norm * (norm + first.abs());
-        for &c in &left {
-            let x = &mut data[c * m + rank..(c + 1) * m];
-            let factor = dot(v, x) / half;
-            x.iter_mut().zip(&*v).for_each(|(x, v)| *x -= factor * v);
-        }
-        let column = &mut data[pivot * m + rank..(pivot + 1) * m];
-        column.fill(0.0);
-        column[0] = reflected;
-        rank += 1;
-    }
-    work.rows(0, rank).into_owned()
+    null_space::pivoted(a, relative_tolerance).rows
 }
 
 /// H with `HHᵀ = A` of a positive semidefinite A (n × n), as many columns as A has directions above rounding: Cholesky with the largest

@@ -1,7 +1,7 @@
 //! Every decomposition rebuilds its input, near-singular and repeated spectra included.
 
 use calib_geometry::decompose::{
-    pencil_eigen, right_singular, semidefinite_eigen, singular_values, solve_least_squares,
+    null_space, pencil_eigen, rank, right_singular, semidefinite_eigen, singular_values, solve_least_squares,
     square_root, svd, svd_small, symmetric_eigen,
 };
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix5};
@@ -9,6 +9,9 @@ use proptest::prelude::*;
 
 /// Rounding of n ≤ 12 Jacobi sweeps, relative to the largest singular value.
 const TOLERANCE: f64 = 1e-13;
+
+/// Share of the largest singular value at which another counts as nothing.
+const OPEN: f64 = 1e-9;
 
 fn assert_svd(a: &DMatrix<f64>) {
     let d = svd(a);
@@ -44,6 +47,13 @@ fn assert_right(a: &DMatrix<f64>, s: &DVector<f64>, scale: f64) {
     let along = (a / scale) * &right.v;
     for i in 0..n {
         assert!((along.column(i).norm() - right.s[i] / scale).abs() <= TOLERANCE * 20.0);
+    }
+    if let Some(found) = null_space(a, OPEN) {
+        let (known, none) = (rank(&right.s, OPEN), &found.basis);
+        assert_eq!((found.rank, none.ncols()), (known, n - known));
+        assert!((none.tr_mul(none) - DMatrix::identity(n - known, n - known)).amax() < TOLERANCE);
+        let leak = right.v.columns(0, known).tr_mul(none);
+        assert!(leak.is_empty() || leak.amax() < 1e-10, "{leak}");
     }
     let square = a.tr_mul(a);
     let rounding = TOLERANCE * square.amax() * 20.0;
@@ -159,4 +169,28 @@ fn a_matrix_of_no_columns_has_no_directions() {
     assert_eq!((nothing.s.len(), nothing.v.shape()), (0, (0, 0)));
     assert_eq!(square_root(&DMatrix::zeros(0, 0)).shape(), (0, 0));
     assert_eq!(square_root(&DMatrix::zeros(2, 2)).shape(), (2, 0));
+}
+
+/// Ranks 0 to 7 of seven columns, from rows that see some directions hardly; and one that is seen as little as the tolerance.
+#[test]
+fn the_null_space_is_found_where_the_rank_leaves_no_doubt() {
+    let wave = |i: usize, k: usize| ((13 * i + 7 * k + 5 * i * k) as f64).sin();
+    let v = svd(&DMatrix::from_fn(7, 7, wave)).v;
+    for seen in 0..=7 {
+        for size in [1e-200, 1.0, 1e150] {
+            let mut s = DMatrix::zeros(7, 7);
+            for i in 0..seen {
+                s[(i, i)] = size * 10_f64.powi(-(i as i32));
+            }
+            let a = DMatrix::from_fn(7, 7, |i, k| wave(k, i)) * s * v.transpose();
+            let found = null_space(&a, OPEN).unwrap();
+            assert_eq!(found.rank, seen);
+            let leak = v.columns(0, seen).tr_mul(&found.basis);
+            assert!(leak.is_empty() || leak.amax() < 1e-9, "{seen} {leak}");
+        }
+    }
+    let doubtful = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, 1.0, 2.0 * OPEN]));
+    assert_eq!(null_space(&doubtful, OPEN), None);
+    assert_eq!(null_space(&DMatrix::from_element(2, 2, f64::NAN), OPEN), None);
+    assert_eq!(null_space(&DMatrix::zeros(3, 0), OPEN).map(|n| n.rank), Some(0));
 }

@@ -16,6 +16,7 @@
 use std::collections::BTreeSet;
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::Options;
@@ -33,6 +34,8 @@ use super::tested::Test;
 const RELINEARIZATIONS: usize = 3;
 /// With fewer degrees of freedom the priors, not the data, decide a test.
 const LEAST_FREEDOM: f64 = 8.0;
+/// Tests that are scored by one task.
+const CHUNK: usize = 120;
 /// Fall of T from the best within which another test explains the data as well (log-likelihood difference 3).
 const AS_GOOD: f64 = 6.0;
 
@@ -223,13 +226,20 @@ fn tests(data: &Data) -> Vec<Test> {
 /// (test, T, k̂, h) for every test.
 fn score_tests(model: &Model<'_>, sums: &Sums, map: &Map) -> Vec<(usize, f64, f64, f64)> {
     let p = model.registration + 6 * model.geometry.len();
-    let cross = sums.cross.rows(0, p).into_owned();
-    let solved = map.factor.solve(&cross);
-    (0..model.tests.len())
+    let count = model.tests.len();
+    let root = map.root.transpose();
+    let taken = |first: usize| -> Vec<f64> {
+        let cross = sums.cross.view((0, first), (p, CHUNK.min(count - first)));
+        let half = &root * cross;
+        half.column_iter().map(|c| c.norm_squared()).collect()
+    };
+    let firsts: Vec<usize> = (0..count).step_by(CHUNK).collect();
+    let taken: Vec<f64> = firsts.into_par_iter().flat_map_iter(taken).collect();
+    (0..count)
         .map(|t| {
             let own = sums.own[t];
-            let h = own - cross.column(t).dot(&solved.column(t));
-            let g = sums.cross[(p, t)] + cross.column(t).dot(&map.x);
+            let h = own - taken[t];
+            let g = sums.cross[(p, t)] + sums.cross.view((0, t), (p, 1)).dot(&map.x);
             // A column that the geometry explains altogether tests nothing.
             if h <= 1e-9 * own || own <= 0.0 {
                 return (t, 0.0, 0.0, f64::INFINITY);

@@ -5,7 +5,8 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use nalgebra::{Cholesky, DMatrix, DVector, Vector3};
+use calib_geometry::decompose::inverse_root;
+use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
 use super::Options;
@@ -368,7 +369,8 @@ pub(crate) fn moving_joints(data: &Data) -> Vec<usize> {
 /// The MAP solution of a whitened model.
 pub(crate) struct Map {
     pub x: DVector<f64>,
-    pub factor: Cholesky<f64, nalgebra::Dyn>,
+    /// W with W Wᵀ = N⁻¹, upper triangular.
+    pub root: DMatrix<f64>,
     pub chi2: f64,
     pub log_likelihood: f64,
     pub sigma: f64,
@@ -399,32 +401,23 @@ pub(crate) fn solve(
     }
     let ridge = RIDGE * n.diagonal().amax();
     (0..p).for_each(|a| n[(a, a)] += ridge);
-    let factor = Cholesky::new(n)?;
-    let x = factor.solve(&rhs);
+    let root = inverse_root(&n)?;
+    let x = &root * root.tr_mul(&rhs);
     let chi2 = (sums.gram[(last, last)] + prior_chi2 - rhs.dot(&x)).max(f64::MIN_POSITIVE);
     let freedom = (sums.observations - m as f64).max(1.0);
-    let log_n: f64 = factor
-        .l_dirty()
-        .diagonal()
-        .iter()
-        .map(|x| 2.0 * x.ln())
-        .sum();
+    let log_n: f64 = root.diagonal().iter().map(|x| -2.0 * x.ln()).sum();
     let log_prior: f64 = precision.iter().map(|x| x.ln()).sum();
     // −2 ln L_REML = ν ln χ² + ln|V| + ln|N| − ln|P|
     let log_likelihood = -0.5 * (freedom * chi2.ln() + sums.log_det + log_n - log_prior);
     // ν = observations − tr(N⁻¹ AᵀA) = observations − p + tr(N⁻¹ P)
-    // N = L Lᵀ: of the last columns of N⁻¹ = L⁻ᵀ L⁻¹ the last block of L alone decides.
-    let mut inverse = DMatrix::identity(g, g);
-    let root = factor.l_dirty().view((m, m), (g, g));
-    root.solve_lower_triangular_mut(&mut inverse);
     let held: f64 = (0..g)
-        .map(|a| inverse.column(a).norm_squared() * precision[a])
+        .map(|a| root.row(m + a).norm_squared() * precision[a])
         .sum();
     let left = (sums.observations - p as f64 + held).max(1.0);
     let sigma = (chi2 / left).sqrt().max(LEAST_SIGMA);
     Some(Map {
         x,
-        factor,
+        root,
         chi2,
         log_likelihood,
         sigma,
@@ -450,8 +443,8 @@ pub(crate) fn projected(
     let mut n = gram.view((0, 0), (m, m)).into_owned();
     let ridge = RIDGE * n.diagonal().amax().max(f64::MIN_POSITIVE);
     (0..m).for_each(|a| n[(a, a)] += ridge);
-    let solved = Cholesky::new(n)?.solve(&cross);
-    Some(own - cross.transpose() * solved)
+    let half = inverse_root(&n)?.transpose() * cross;
+    Some(own - half.transpose() * half)
 }
 
 #[cfg(test)]

@@ -11,11 +11,11 @@
 
 use std::collections::BTreeMap;
 use std::ops::Range;
-use std::sync::Arc;
+use std::sync::{Arc, OnceLock};
 
 use nalgebra::{DMatrix, DVector};
 
-use calib_geometry::decompose;
+use calib_geometry::decompose::{self, NullSpace, RightSingular, lower_inverse};
 
 use crate::model::cache::State;
 use crate::model::layout::Model;
@@ -25,7 +25,6 @@ use crate::solve::chunks::{chunked, is_one_chunk};
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::rows::SampleRows;
 use crate::solve::structured::RandomPart;
-use crate::solve::whitened::lower_inverse;
 
 /// A direction whose singular value is below this fraction of the largest is a gauge: rounding
 /// leaves about 1e-14, the weakest physical effect seen on real robots about 1e-6.
@@ -121,10 +120,6 @@ impl StreamedQr {
 pub struct Information {
     /// S of equation (1): one length unit per free parameter.
     pub scale: DVector<f64>,
-    /// d of equation (1), descending: how many σ of the data one prior σ along each direction is.
-    pub singular_values: DVector<f64>,
-    /// W of equation (1): columns are directions in units of `scale`, in the order of `singular_values`.
-    pub directions: DMatrix<f64>,
     /// How many directions the data see at all.
     pub rank: usize,
     /// C of equation (2), with prior; directions that neither data nor prior see count as 0 here and
@@ -132,7 +127,12 @@ pub struct Information {
     pub covariance: DMatrix<f64>,
     /// Unit directions (in units of `scale`) that neither data nor prior determine.
     pub indeterminate: DMatrix<f64>,
-    pub(crate) r: DMatrix<f64>,
+    /// R of equation (1), upper triangular.
+    pub root: DMatrix<f64>,
+    /// Directions that the data do not see at all.
+    null: DMatrix<f64>,
+    /// d and W of equation (1): many times the price of all else here, and few ask.
+    spectrum: OnceLock<RightSingular>,
 }
 
 /// The triangular factor of a part's rows of some samples, columns in units of `scale`, those of the part.
@@ -295,8 +295,17 @@ impl Information {
 
     fn from_factor(model: &Model, scale: DVector<f64>, r: DMatrix<f64>) -> Self {
         let n = scale.len();
-        let svd = decompose::right_singular(&r);
-        let rank = decompose::rank(&svd.s, NULL_TOLERANCE);
+        let spectrum = OnceLock::new();
+        let of_all = || spectrum.get_or_init(|| decompose::right_singular(&r));
+        let NullSpace { rank, basis: null } = decompose::null_space(&r, NULL_TOLERANCE)
+            .unwrap_or_else(|| {
+                let RightSingular { s, v } = of_all();
+                let rank = decompose::rank(s, NULL_TOLERANCE);
+                NullSpace {
+                    rank,
+                    basis: v.columns(rank, n - rank).into_owned(),
+                }
+            });
         // [R; P^½]
         let priors: Vec<(usize, f64)> = model
             .columns
@@ -316,7 +325,7 @@ impl Information {
                     augmented[(n + i, c)] = weight;
                 }
                 let posterior = if priors.is_empty() {
-                    svd.clone()
+                    of_all().clone()
                 } else {
                     decompose::right_singular(&augmented)
                 };
@@ -336,12 +345,12 @@ impl Information {
         let covariance = &half * half.transpose();
         Self {
             scale,
-            singular_values: svd.s,
-            directions: svd.v,
             rank,
             covariance,
             indeterminate,
-            r,
+            root: r,
+            null,
+            spectrum,
         }
     }
 
@@ -349,7 +358,7 @@ impl Information {
     pub(crate) fn curvature(&self, model: &Model) -> NormalEquations {
         let n = self.scale.len();
         let mut system = NormalEquations::new(n);
-        let squared = self.r.transpose() * &self.r;
+        let squared = self.root.transpose() * &self.root;
         for i in 0..n {
             for j in i..n {
                 system.h[i * n + j] = squared[(i, j)] / (self.scale[i] * self.scale[j]);
@@ -373,16 +382,30 @@ impl Information {
                 unscaled[(i, j)] /= self.scale[i] * self.scale[j];
             }
         }
-        (&self.r * unscaled).dot(&self.r)
+        (&self.root * unscaled).dot(&self.root)
     }
 
-    /// Directions that the data do not see at all, columns in units of `scale`.
+    /// d of equation (1), descending: how many σ of the data one prior σ along each direction is.
     #[must_use]
-    pub fn null_space(&self) -> DMatrix<f64> {
-        let n = self.scale.len();
-        self.directions
-            .columns(self.rank, n - self.rank)
-            .into_owned()
+    pub fn singular_values(&self) -> &DVector<f64> {
+        &self.spectrum().s
+    }
+
+    /// W of equation (1): columns are directions in units of `scale`, in the order of `singular_values`.
+    #[must_use]
+    pub fn directions(&self) -> &DMatrix<f64> {
+        &self.spectrum().v
+    }
+
+    fn spectrum(&self) -> &RightSingular {
+        let of_root = || decompose::right_singular(&self.root);
+        self.spectrum.get_or_init(of_root)
+    }
+
+    /// Directions that the data do not see at all, orthonormal columns in units of `scale`.
+    #[must_use]
+    pub fn null_space(&self) -> &DMatrix<f64> {
+        &self.null
     }
 
     /// Posterior σ of a free parameter; `None` where nothing determines it.
@@ -395,17 +418,14 @@ impl Information {
     /// Posterior σ along singular direction i, in units of `scale`: `√(w_iᵀ S⁻¹ C S⁻¹ w_i)`.
     #[must_use]
     pub fn posterior_along(&self, i: usize) -> f64 {
-        let w = self.directions.column(i).component_div(&self.scale);
+        let w = self.directions().column(i).component_div(&self.scale);
         (&self.covariance * &w).dot(&w).max(0.0).sqrt()
     }
 
     /// Largest share of a unit null direction in this column: 0 when the data alone determine it.
     #[must_use]
     pub fn null_share(&self, column: usize) -> f64 {
-        let n = self.scale.len();
-        self.directions
-            .view((column, self.rank), (1, n - self.rank))
-            .norm()
+        self.null.row(column).norm()
     }
 }
 

@@ -1,5 +1,7 @@
 //! What the data cannot determine, as data: which parameters change together, and why. Words are made by the renderer.
 
+use std::ops::Range;
+
 use nalgebra::DVector;
 use serde::{Deserialize, Serialize};
 
@@ -38,14 +40,10 @@ pub struct Direction {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[non_exhaustive]
 pub struct Observability {
-    /// Singular values of the whitened Jacobian in units of the parameters' scales, descending.
-    pub singular_values: Vec<f64>,
     /// Directions that the data see.
     pub rank: usize,
     /// Not observable: no measurement changes along them.
     pub null: Vec<Direction>,
-    /// Weakly identifiable: with a data-only σ larger than the prior's.
-    pub weak: Vec<Direction>,
     /// Joints that did not move, held at nominal.
     pub unmoved: Vec<EdgeId>,
 }
@@ -64,37 +62,69 @@ const WEAK: f64 = 1.0;
 /// Shares of a direction are distinguished to one part in this many: far above rounding, far below anything that is printed.
 const ALIKE: f64 = 1e6;
 
-/// Null space (sparse where it can be) and weakly identifiable directions of a solved model.
+/// Null space (sparse where it can be) of a solved model.
 pub(crate) fn observe(model: &Model, values: &Values, information: &Information) -> Observability {
-    let places = places(model);
-    let axes = Axes::new(model, values);
-    let direction = |v: &DVector<f64>, sigma_ratio: Option<f64>| -> Direction {
-        let (columns, terms) = terms(model, information, v);
-        Direction {
-            terms,
-            sigma_ratio,
-            gauge: classify(model, &places, &axes, &columns),
-        }
-    };
+    let named = Named::new(model, values, information);
     let null = information.null_space();
     let basis = if null.ncols() == 0 {
         Vec::new()
     } else {
-        sparse_basis(&null, &blocks(model, &places))
+        sparse_basis(null, &blocks(model, &named.places))
     };
-    let singular_values = &information.singular_values;
-    let weak = (0..information.rank).filter(|&i| singular_values[i] < WEAK);
     Observability {
-        singular_values: singular_values.iter().copied().collect(),
         rank: information.rank,
-        null: basis.iter().map(|v| direction(v, None)).collect(),
-        weak: weak
-            .map(|i| {
-                let v = information.directions.column(i).into_owned();
-                direction(&v, Some(1.0 / singular_values[i]))
-            })
-            .collect(),
+        null: basis.iter().map(|v| named.direction(v, None)).collect(),
         unmoved: model.unmoved().to_vec(),
+    }
+}
+
+/// Which of [`Information::directions`] are weakly identifiable: the last that the data see.
+pub(crate) fn weak(information: &Information) -> Range<usize> {
+    let values = information.singular_values().iter();
+    let strong = values.take_while(|s| **s >= WEAK).count();
+    strong.min(information.rank)..information.rank
+}
+
+/// These directions in terms of the parameters.
+pub(crate) fn directions(
+    model: &Model,
+    values: &Values,
+    information: &Information,
+    of: Range<usize>,
+) -> Vec<Direction> {
+    let named = Named::new(model, values, information);
+    let direction = |i: usize| {
+        let v = information.directions().column(i).into_owned();
+        named.direction(&v, Some(1.0 / information.singular_values()[i]))
+    };
+    of.map(direction).collect()
+}
+
+/// What directions are named by.
+struct Named<'a> {
+    model: &'a Model,
+    information: &'a Information,
+    places: Vec<Place>,
+    axes: Axes,
+}
+
+impl<'a> Named<'a> {
+    fn new(model: &'a Model, values: &Values, information: &'a Information) -> Self {
+        Self {
+            model,
+            information,
+            places: places(model),
+            axes: Axes::new(model, values),
+        }
+    }
+
+    fn direction(&self, v: &DVector<f64>, sigma_ratio: Option<f64>) -> Direction {
+        let (columns, terms) = terms(self.model, self.information, v);
+        Direction {
+            terms,
+            sigma_ratio,
+            gauge: classify(self.model, &self.places, &self.axes, &columns),
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::analysis::information::{INDETERMINATE, Information};
-use crate::analysis::observability::Observability;
+use crate::analysis::observability::{Direction, Observability, directions, weak};
 use crate::graph::ids::{GroupId, ParameterId};
 use crate::graph::parameter::ParameterKind;
 use crate::graph::problem::NoiseKind;
@@ -118,7 +118,7 @@ pub struct Solution {
     pub noise: Vec<NoiseEstimate>,
     /// Spectrum and covariance.
     pub information: Information,
-    /// Null space and weakly identifiable directions.
+    /// Null space.
     pub observability: Observability,
     /// Robust weight per observation: 0 rejected or held out, 1 kept.
     pub weights: Vec<f64>,
@@ -136,6 +136,13 @@ impl Solution {
             weights: &self.weights,
             theta: &self.theta,
         }
+    }
+
+    /// Weakly identifiable directions, with a data-only σ larger than the prior's: the last of [`Information::directions`] that the data see.
+    #[must_use]
+    pub fn weak(&self) -> Vec<Direction> {
+        let of = weak(&self.information);
+        directions(&self.model, &self.values, &self.information, of)
     }
 
     /// Row and column of a parameter in [`Information::covariance`], by its index; `None` where it is held.

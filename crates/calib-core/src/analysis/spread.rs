@@ -95,18 +95,7 @@ impl Solution {
     /// Equations (1) to (5) over some postures; `None` without postures or free parameters.
     #[must_use]
     pub fn spread(&self, points: &[LinearPoint], placement: Placement) -> Option<PostureSpread> {
-        let n = self.model.free();
-        if n == 0 || points.is_empty() {
-            return None;
-        }
-        let mut g = DMatrix::zeros(3 * points.len(), n);
-        for (m, point) in points.iter().enumerate() {
-            g.view_mut((3 * m, 0), (3, n)).copy_from(&point.jacobian);
-        }
-        if placement == Placement::Free {
-            let rigid = rigid_motions(points);
-            g -= &rigid * (rigid.transpose() * &g);
-        }
+        let g = self.moved(points, placement)?;
         let half = self.half_covariance();
         let prior = self.prior_information();
         let moved = &g * &half;
@@ -116,15 +105,17 @@ impl Solution {
             .collect();
         let rms = moved.norm() / root;
         let svd = decompose::right_singular(&moved);
+        let known = svd.s.iter().take_while(|s| **s / root > NOTHING).count();
+        let along = &half * svd.v.columns(0, known);
+        let displaced = &g * &along;
         let directions: Vec<SpreadDirection> = svd
             .s
             .iter()
+            .take(known)
             .enumerate()
-            .filter(|(_, s)| **s / root > NOTHING)
             .map(|(k, s)| {
-                let v = &half * svd.v.column(k);
-                let displaced = &g * &v;
-                let at = |m: usize| displaced.rows(3 * m, 3).norm();
+                let v: DVector<f64> = along.column(k).into();
+                let at = |m: usize| displaced.view((3 * m, k), (3, 1)).norm();
                 SpreadDirection {
                     rms: s / root,
                     max: (0..points.len()).map(at).fold(0.0, f64::max),
@@ -147,6 +138,31 @@ impl Solution {
             directions,
             unbounded: self.is_unbounded(&g, root),
         })
+    }
+
+    /// [`PostureSpread::rms`] alone.
+    #[must_use]
+    pub fn spread_rms(&self, points: &[LinearPoint], placement: Placement) -> Option<f64> {
+        let g = self.moved(points, placement)?;
+        let squares = (&g * &self.information.covariance).dot(&g);
+        Some((squares.max(0.0) / points.len() as f64).sqrt())
+    }
+
+    /// How the points follow the free parameters, 3 rows each; `None` without any of either.
+    fn moved(&self, points: &[LinearPoint], placement: Placement) -> Option<DMatrix<f64>> {
+        let n = self.model.free();
+        if n == 0 || points.is_empty() {
+            return None;
+        }
+        let mut g = DMatrix::zeros(3 * points.len(), n);
+        for (m, point) in points.iter().enumerate() {
+            g.view_mut((3 * m, 0), (3, n)).copy_from(&point.jacobian);
+        }
+        if placement == Placement::Free {
+            let rigid = rigid_motions(points);
+            g -= &rigid * (rigid.transpose() * &g);
+        }
+        Some(g)
     }
 
     /// A square root of C of equation (2) of [`Information`](crate::Information): C = H Hᵀ, free parameters × directions that are known.

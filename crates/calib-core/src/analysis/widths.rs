@@ -16,10 +16,10 @@
 //! A width that is likelier is used where it also predicts better: the values move by more than the data can miss, and left-out poses
 //! are predicted better (no worse, where all widths grow). Otherwise the given one stays.
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use calib_geometry::decompose::{semidefinite_eigen, solve_least_squares};
+use calib_geometry::decompose::{inverse_root, semidefinite_eigen, solve_least_squares};
 
 use crate::analysis::information::Information;
 use crate::analysis::refit::{Start, refit};
@@ -194,6 +194,30 @@ impl Solution {
     }
 }
 
+/// M of equation (1) from S = C in units of the priors: S⁻¹ − 1, where no direction is known less than the prior alone knows it.
+fn information(s: &DMatrix<f64>) -> DMatrix<f64> {
+    /// What the data know better than this, relative to the prior's variance, they know.
+    const KNOWN: f64 = 1e-10;
+    /// Below this S⁻¹ is right to 8 digits, and is all there is to ask for…
+    const CLEAR: f64 = 1e8;
+    /// …where it is no less than 1 by more than rounding.
+    const ROUNDING: f64 = 1e-7;
+    let n = s.nrows();
+    let one = DMatrix::identity(n, n);
+    if let Some(root) = inverse_root(s).filter(|root| root.norm_squared() < CLEAR) {
+        let m = &root * root.transpose() - &one;
+        if inverse_root(&(&m + one * ROUNDING)).is_some() {
+            return m;
+        }
+    }
+    let eigen = semidefinite_eigen(s);
+    let mut scaled = eigen.vectors.clone();
+    for (mut column, value) in scaled.column_iter_mut().zip(&eigen.values) {
+        column.scale_mut(1.0 / value.clamp(KNOWN, 1.0) - 1.0);
+    }
+    scaled * eigen.vectors.transpose()
+}
+
 /// Equations (1) to (3) of one solution.
 struct Evidence {
     /// M.
@@ -218,8 +242,6 @@ struct At {
 
 impl Evidence {
     fn of(solution: &Solution, kinds: &[WidthKind], known: &[f64]) -> Option<Self> {
-        /// What the data know better than this, relative to the prior's variance, they know.
-        const KNOWN: f64 = 1e-10;
         let parameters = solution.model.problem().parameters();
         // A number at its nominal value because physics allows no less (compliance, backlash) says as much as one that is 0; one that
         // a stated limit stopped would be farther out: it takes no part, and the others are judged beside it.
@@ -235,22 +257,13 @@ impl Evidence {
         let scaled = DMatrix::from_fn(n, n, |i, j| {
             covariance[(used[i].1, used[j].1)] / (used[i].2 * used[j].2)
         });
-        let eigen = semidefinite_eigen(&scaled);
         let z = DVector::from_iterator(
             n,
             used.iter()
                 .map(|&(p, _, sigma)| (solution.values.0[p] - parameters[p].nominal) / sigma),
         );
-        let precision = eigen.values.map(|value| 1.0 / value.clamp(KNOWN, 1.0));
-        let along = |weights: &DVector<f64>| {
-            let mut scaled = eigen.vectors.clone();
-            for (k, weight) in weights.iter().enumerate() {
-                scaled.column_mut(k).scale_mut(*weight);
-            }
-            scaled
-        };
-        let m = along(&precision.map(|p| p - 1.0)) * eigen.vectors.transpose();
-        let b = along(&precision) * eigen.vectors.tr_mul(&z);
+        let m = information(&scaled);
+        let b = &m * &z + &z;
         let of = |p: usize| {
             let id = ParameterId::of(p);
             kinds.iter().position(|kind| kind.parameters.contains(&id))
@@ -298,10 +311,10 @@ impl Evidence {
         for (i, d) in inverse.iter().enumerate() {
             precision[(i, i)] += d * d;
         }
-        let factor = Cholesky::new(precision)?;
-        let z = factor.solve(&self.b);
-        let half_log_det: f64 = factor.l_dirty().diagonal().iter().map(|l| l.ln()).sum();
-        let covariance = factor.inverse();
+        let root = inverse_root(&precision)?;
+        let z = &root * root.tr_mul(&self.b);
+        let half_log_det: f64 = -root.diagonal().iter().map(|r| r.ln()).sum::<f64>();
+        let covariance = &root * root.transpose();
         let w = DMatrix::from_fn(n, n, |i, j| {
             f64::from(u8::from(i == j)) - inverse[i] * covariance[(i, j)] * inverse[j]
         });

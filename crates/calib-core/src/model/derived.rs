@@ -11,6 +11,7 @@ use nalgebra::{DMatrix, Isometry3, Matrix3, Matrix6, Point3, Vector3, Vector6};
 
 use calib_geometry::{Twist, so3};
 
+use crate::analysis::observability::weak;
 use crate::analysis::solution::Solution;
 use crate::analysis::spread::LinearPoint;
 use crate::analysis::untested::MovedPoint;
@@ -292,7 +293,7 @@ impl Solution {
         Ok(pose.isometry())
     }
 
-    /// What each weak direction ([`Observability::weak`](crate::Observability::weak), same order) costs at
+    /// What each weak direction ([`Solution::weak`], same order) costs at
     /// a point of `to`: σ of its position in `from`, m, if that direction alone were uncertain.
     ///
     /// # Errors
@@ -308,10 +309,9 @@ impl Solution {
             pose, path, buffer, ..
         } = self.evaluate(from, to, at)?;
         let f = self.scaled(&(point_rows(&pose, point) * self.expand(&path, &buffer)));
-        let first = self.information.rank - self.observability.weak.len();
-        Ok((first..self.information.rank)
+        Ok(weak(&self.information)
             .map(|i| {
-                let moved = &f * self.information.directions.column(i);
+                let moved = &f * self.information.directions().column(i);
                 let prior = &self.information;
                 // Posterior σ along the direction in units of its scale: data and prior together.
                 moved.norm() * prior.posterior_along(i)

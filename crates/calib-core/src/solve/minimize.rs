@@ -21,14 +21,13 @@
 //! v = (g₊ − g) − H₊ δ − K δ,   K ← K + v vᵀ/(vᵀδ)                                              (2)
 //! ```
 
-use calib_geometry::decompose::dot;
+use calib_geometry::decompose::{cholesky_in_place, dot, solve_in_place};
 use serde::{Deserialize, Serialize};
 
 use crate::graph::edge::EdgeKind;
 use crate::model::layout::Model;
 use crate::model::values::{Values, coordinates};
 use crate::solve::bounded::{Damped, bounded_step};
-use crate::solve::cholesky::{cholesky_in_place, solve_in_place};
 use crate::solve::curvature::Curvature;
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::normal::{accumulate, cost};

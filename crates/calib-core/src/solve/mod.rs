@@ -1,7 +1,6 @@
 //! The minimum of the stated problem: rows, normal equations, steps, noise, robust weights.
 
 pub(crate) mod bounded;
-pub(crate) mod cholesky;
 pub(crate) mod chunks;
 pub(crate) mod components;
 pub(crate) mod compressed;

@@ -4,12 +4,12 @@
 //! V_s = L Lᵀ,   A_s = L⁻¹ J_s,   w_s = L⁻¹ e_s,   C = H⁻¹                                     (1)
 //! ```
 
+use calib_geometry::decompose::{cholesky_in_place, lower_inverse};
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::cache::State;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
-use crate::solve::cholesky::cholesky_in_place;
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::parted::Parted;
 use crate::solve::rows::SampleRows;
@@ -57,28 +57,6 @@ pub(crate) fn root_of(system: &NormalEquations) -> Option<DMatrix<f64>> {
         row.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);
     }
     Some(DMatrix::from_vec(n, n, inverse))
-}
-
-/// L⁻¹ of a lower triangular L, both row by row.
-pub(crate) fn lower_inverse(l: &[f64], n: usize) -> Vec<f64> {
-    let mut out = vec![0.0; n * n];
-    for i in 0..n {
-        // row i of L⁻¹ = (e_i − Σ_j<i L_ij row j) / L_ii
-        let (done, rest) = out.split_at_mut(i * n);
-        let row = &mut rest[..=i];
-        for (j, &factor) in l[i * n..i * n + i].iter().enumerate() {
-            if factor != 0.0 {
-                let above = &done[j * n..=j * n + j];
-                row.iter_mut()
-                    .zip(above)
-                    .for_each(|(x, y)| *x -= factor * y);
-            }
-        }
-        row[i] = 1.0;
-        let d = 1.0 / l[i * n + i];
-        row.iter_mut().for_each(|x| *x *= d);
-    }
-    out
 }
 
 /// One sample in whitened form, V = LLᵀ: A = L⁻¹J (m × n), w (m), L⁻¹ (m × m).

@@ -95,7 +95,7 @@ fn weak_directions_are_priced_at_the_tool() {
     let mut h = chain.problem(&free, 1e-3);
     chain.observe(&mut r, &mut h, 1e-3, 0.0);
     let s = solve(&h.problem, &Settings::plain()).unwrap();
-    assert!(!s.observability.weak.is_empty());
+    assert!(!s.weak().is_empty());
     let mut at = Configuration::zero();
     for j in &h.joints {
         at = at.with(*j, 1.2);
@@ -103,7 +103,7 @@ fn weak_directions_are_priced_at_the_tool() {
     let price = s
         .weak_at_point(h.tracker, h.body, &Point3::origin(), &at)
         .unwrap();
-    assert_eq!(price.len(), s.observability.weak.len());
+    assert_eq!(price.len(), s.weak().len());
     let total = s
         .predict_point(h.tracker, h.body, &Point3::origin(), &at)
         .unwrap()
@@ -113,7 +113,7 @@ fn weak_directions_are_priced_at_the_tool() {
         .sqrt();
     assert!(price.iter().all(|p| p.is_finite() && *p <= 3.0 * total));
     assert!(price.iter().any(|p| *p > 1e-4));
-    for w in &s.observability.weak {
+    for w in &s.weak() {
         assert!(w.sigma_ratio.unwrap() > 1.0);
     }
 }

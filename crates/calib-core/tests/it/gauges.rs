@@ -165,7 +165,7 @@ impl Case {
             self.expected.nullity,
             "{}: {directions:#?}\n{:?}",
             self.name,
-            o.singular_values
+            s.information.singular_values()
         );
         let mut left: Vec<&calib_core::Direction> = o.null.iter().collect();
         for (gauge, parameters) in &self.expected.directions {

@@ -23,11 +23,14 @@ pub(super) fn one_sided_jacobi(a: &mut [f64], mut v: Option<&mut [f64]>, s: &mut
         let mut rotated = false;
         for p in 0..n {
             for q in p + 1..n {
-                let (x, y) = pair(a, p, q, n);
-                let gamma = dot(x, y);
                 let product = s[p] * s[q];
                 // Underflowing columns are zero columns.
-                if gamma == 0.0 || gamma.abs() <= threshold * product.sqrt() || product == 0.0 {
+                if product == 0.0 {
+                    continue;
+                }
+                let (x, y) = pair(a, p, q, n);
+                let gamma = dot(x, y);
+                if gamma == 0.0 || gamma.abs() <= threshold * product.sqrt() {
                     continue;
                 }
                 rotated = true;

@@ -4,7 +4,7 @@
 //! The postures are spread evenly over the box of the recorded joint ranges, joints combined freely: single-joint sweeps
 //! record few of them. The point is the tool that was measured: a body, a marker, or a touching point.
 
-use calib_core::{LinearPoint, Placement, PostureSpread, SpreadDirection, Target};
+use calib_core::{LinearPoint, Placement, SpreadDirection, Target};
 use calib_finding::{About, Fact, Finding, catalog};
 use calib_profile::Usage;
 use calib_report::{HeldOut, OpenDirection, RobotSize, WeakDirections, WeakTerm};
@@ -39,20 +39,19 @@ pub fn weak_directions(inputs: &Inputs, fit: &MlFit) -> Option<WeakDirections> {
     };
     let fitted = fitted_rows(inputs);
     let box_of = postures(inputs, &fitted);
-    let at = |rows: &[Vec<f64>]| -> Option<(Vec<LinearPoint>, PostureSpread)> {
+    let at = |rows: &[Vec<f64>]| -> Option<Vec<LinearPoint>> {
         let see = |q: &Vec<f64>| {
             let at = configuration(inputs, fit, q);
             let seen = solution.linear_point(fit.formulation.tracker, target, &at);
             seen.ok()
         };
-        let points: Vec<LinearPoint> = rows.iter().map(see).collect::<Option<_>>()?;
-        let spread = solution.spread(&points, placement)?;
-        Some((points, spread))
+        rows.iter().map(see).collect()
     };
-    let (points, spread) = at(&box_of)?;
+    let points = at(&box_of)?;
+    let spread = solution.spread(&points, placement)?;
     let step = fitted.len().div_ceil(RECORDED).max(1);
     let recorded: Vec<Vec<f64>> = fitted.iter().step_by(step).map(|q| q.to_vec()).collect();
-    let recorded = at(&recorded).map(|(_, spread)| spread.rms);
+    let recorded = at(&recorded).and_then(|points| solution.spread_rms(&points, placement));
     let base = fit.calibration.tracker_from_root.translation.vector;
     let reach = points
         .iter()

@@ -22,12 +22,8 @@ pub fn data_information(inputs: &Inputs, fit: &MlFit) -> DataInformation {
     if n == 0 {
         return DataInformation::default();
     }
-    // J scaled = U₁ diag(d) Wᵀ: diag(d) Wᵀ S⁻¹ has the same JᵀJ; its triangular factor is unique up to signs.
-    let mut root = information.directions.transpose();
-    for (i, d) in information.singular_values.iter().enumerate() {
-        root.row_mut(i).scale_mut(*d);
-    }
-    let mut root: DMatrix<f64> = root.select_columns(&columns).qr().r();
+    // The triangular factor is unique up to signs.
+    let mut root: DMatrix<f64> = information.root.select_columns(&columns).qr().r();
     for (c, &column) in columns.iter().enumerate() {
         root.column_mut(c).unscale_mut(information.scale[column]);
     }

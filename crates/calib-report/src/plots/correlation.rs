@@ -2,7 +2,7 @@
 
 use super::{Plot, PlotKind};
 use crate::{Class, DataInformation, Report, number};
-use calib_geometry::decompose::semidefinite_eigen;
+use calib_geometry::decompose::{inverse_root, semidefinite_eigen};
 use nalgebra::{DMatrix, DVector};
 
 /// Parameters in the picture: more are not readable.
@@ -59,17 +59,18 @@ fn correlations(report: &Report) -> Option<(Vec<String>, Vec<Vec<f64>>)> {
     if columns.len() < 2 {
         return None;
     }
-    let c = covariance(of)?;
+    let root = root(of)?.select_rows(&columns);
+    let c = &root * root.transpose();
     let rho = |i: usize, j: usize| c[(i, j)] / (c[(i, i)] * c[(j, j)]).sqrt();
-    let row = |(k, i): (usize, &usize)| columns[..k].iter().map(|j| rho(*i, *j)).collect();
-    let rows: Vec<Vec<f64>> = columns.iter().enumerate().map(row).collect();
+    let row = |i: usize| (0..i).map(|j| rho(i, j)).collect();
+    let rows: Vec<Vec<f64>> = (0..columns.len()).map(row).collect();
     let finite = rows.iter().flatten().all(|x: &f64| x.is_finite());
     let names = columns.iter().map(|i| of.parameters[*i].clone());
     finite.then(|| (names.collect(), rows))
 }
 
-/// (UᵀU + P)⁺ where each parameter is in units of what the data tell of it alone: lengths beside angles.
-fn covariance(of: &DataInformation) -> Option<DMatrix<f64>> {
+/// A root of (UᵀU + P)⁺ where each parameter is in units of what the data say of it alone: lengths beside angles.
+fn root(of: &DataInformation) -> Option<DMatrix<f64>> {
     let n = of.parameters.len();
     let mut u = DMatrix::zeros(n, n);
     for (i, row) in of.root.iter().enumerate().take(n) {
@@ -77,7 +78,7 @@ fn covariance(of: &DataInformation) -> Option<DMatrix<f64>> {
             u[(i, i + k)] = *value;
         }
     }
-    let mut h = u.tr_mul(&u);
+    let mut h = u.transpose() * &u;
     for (i, sigma) in of.prior_sigma.iter().enumerate().take(n) {
         if let Some(sigma) = sigma {
             h[(i, i)] += 1.0 / (sigma * sigma);
@@ -98,16 +99,18 @@ fn covariance(of: &DataInformation) -> Option<DMatrix<f64>> {
     if h.iter().any(|x| !x.is_finite()) {
         return None;
     }
-    let eigen = semidefinite_eigen(&h);
-    let largest = eigen.values.iter().fold(0.0_f64, |a, b| a.max(*b));
-    let mut c = DMatrix::zeros(n, n);
-    for (k, value) in eigen.values.iter().enumerate() {
-        if *value > OPEN * largest {
-            let v = eigen.vectors.column(k);
-            c.ger(1.0 / value, &v, &v, 1.0);
-        }
+    // No eigenvalue is larger than the trace, and none smaller than 1/|W|².
+    let determined = |root: &DMatrix<f64>| root.norm_squared() * h.trace() * OPEN < 1.0;
+    if let Some(root) = inverse_root(&h).filter(determined) {
+        return Some(root);
     }
-    Some(c)
+    let eigen = semidefinite_eigen(&h);
+    let least = OPEN * eigen.values.iter().fold(0.0_f64, |a, b| a.max(*b));
+    let mut root = eigen.vectors;
+    for (mut column, value) in root.column_iter_mut().zip(&eigen.values) {
+        column.scale_mut(if *value > least { value.powf(-0.5) } else { 0.0 });
+    }
+    Some(root)
 }
 
 /// `a and b 0.97`, the pairs that are correlated most.

@@ -4,9 +4,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::columns::{Candidates, Pattern};
 use crate::analysis::solution::Solution;
-use crate::solve::cholesky::cholesky_in_place;
+use calib_geometry::decompose::{cholesky_in_place, lower_inverse};
 use crate::solve::parted::Parted;
-use crate::solve::whitened::lower_inverse;
 
 mod filled;
 mod others;

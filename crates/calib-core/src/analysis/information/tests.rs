@@ -58,7 +58,7 @@ fn the_information_is_that_of_all_rows() {
         }
     }
     let found = Information::at(&model, &values, &weights, &theta).expect("evaluable");
-    let r = DMatrix::from_fn(n, n, |i, j| found.r[(i, j)] / found.scale[j]);
+    let r = DMatrix::from_fn(n, n, |i, j| found.root[(i, j)] / found.scale[j]);
     let off = r.transpose() * &r - &h;
     for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
         // Sums of some 200 rows in another order.

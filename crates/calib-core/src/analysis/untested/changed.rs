@@ -16,7 +16,7 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::{Common, Direction, MovedPoint};
+use super::{Common, Direction, MovedPoint, add_motion};
 use crate::analysis::change::columns::{Candidates, Pattern};
 use crate::analysis::change::contest::holds;
 use crate::analysis::change::{Change, Moved};
@@ -148,21 +148,16 @@ impl<'a> Changed<'a> {
                     .map(|(i, c)| self.displacement(i, p) * (c * self.used))
                     .sum()
             };
-            common.displaced(&(&common.covariance * (&b * c)), postures.iter().map(at))
+            let mut out = -(&common.moved * (&b * c));
+            add_motion(&mut out.column_mut(0), postures.iter().map(at));
+            out
         };
-        let mut out = vec![Direction {
-            displaced: displaced(&jump),
-            size: (1.0, 0.0),
-        }];
-        out.extend(
-            self.half_covariance(common)
-                .column_iter()
-                .map(|c| Direction {
-                    displaced: displaced(&c.into_owned()),
-                    size: (0.0, 1.0),
-                }),
-        );
-        out
+        let half = self.half_covariance(common);
+        let jumps = std::iter::once((jump.clone(), (1.0, 0.0)));
+        let open = half.column_iter().map(|c| (c.into_owned(), (0.0, 1.0)));
+        let (parts, sizes): (Vec<DVector<f64>>, Vec<(f64, f64)>) = jumps.chain(open).unzip();
+        let displaced: Vec<DVector<f64>> = parts.iter().map(displaced).collect();
+        common.directions(DMatrix::from_columns(&displaced), sizes)
     }
 
     /// A square root of the covariance of c.

@@ -22,7 +22,8 @@ mod sums;
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, DVectorViewMut, Matrix3, Vector3};
+use rayon::prelude::*;
 
 use crate::analysis::change::Change;
 use crate::analysis::solution::Solution;
@@ -34,6 +35,9 @@ use crate::solve::equations::Objective;
 use crate::solve::whitened::covariance_of;
 use changed::Changed;
 use sums::{Columns, Design, Seen};
+
+/// Effects whose products are taken by one task.
+const CHUNK: usize = 64;
 
 /// What an effect moves, per unit of its regressor and coefficient.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -145,10 +149,10 @@ struct Common {
     covariance: DMatrix<f64>,
     /// The same of the fitted samples alone.
     fitted: DMatrix<f64>,
-    /// [G_m]_m H^(-½)/√M.
+    /// [G_m]_m C/√M.
     moved: DMatrix<f64>,
-    /// Gram matrix of `moved`, and its trace.
-    gram: DMatrix<f64>,
+    /// K = [G_m]_m C [G_m]_mᵀ/M, what the parameters leave open.
+    open: DMatrix<f64>,
     /// Factor of all variances: memory of the noise.
     level: f64,
     /// Degrees of freedom of the noise.
@@ -159,78 +163,111 @@ struct Common {
     joints: (f64, f64),
 }
 
+/// A displacement of all u_m/√M.
+#[derive(Clone)]
+struct Displacement {
+    d: DVector<f64>,
+    /// K d.
+    open: DVector<f64>,
+}
+
+impl Displacement {
+    fn scaled(&self, factor: f64) -> Self {
+        Self {
+            d: &self.d * factor,
+            open: &self.open * factor,
+        }
+    }
+
+    fn add(&mut self, factor: f64, other: &Self) {
+        self.d.axpy(factor, &other.d, 1.0);
+        self.open.axpy(factor, &other.open, 1.0);
+    }
+
+    /// dᵀK d
+    fn along(&self) -> f64 {
+        self.d.dot(&self.open)
+    }
+}
+
 /// One direction of a cause.
 struct Direction {
-    /// What it does to all u_m/√M, per unit.
-    displaced: DVector<f64>,
+    /// What it does, per unit.
+    displaced: Displacement,
     /// Mean and standard deviation.
     size: (f64, f64),
 }
 
 impl Common {
-    /// d_m − G_m H⁻¹b of equation (3), of all postures; `step` is H⁻¹b.
-    fn displaced(
-        &self,
-        step: &DVector<f64>,
-        at: impl Iterator<Item = Vector3<f64>>,
-    ) -> DVector<f64> {
-        let mut d = -(&self.g * step);
-        let root = (d.len() as f64 / 3.0).sqrt();
-        for (m, moved) in at.enumerate() {
-            let mut place = d.rows_mut(3 * m, 3);
-            place += moved / root;
-        }
-        d
+    /// Columns of displacements, with their sizes.
+    fn directions(&self, displaced: DMatrix<f64>, sizes: Vec<(f64, f64)>) -> Vec<Direction> {
+        let open = &self.open * &displaced;
+        let columns = displaced.column_iter().zip(open.column_iter());
+        columns
+            .zip(sizes)
+            .map(|((d, open), size)| Direction {
+                displaced: Displacement {
+                    d: d.into_owned(),
+                    open: open.into_owned(),
+                },
+                size,
+            })
+            .collect()
     }
 
-    /// Equation (2).
-    fn of_effect(
+    /// Equations (2) and (3) of the effects from `first` on.
+    fn of_effects(
         &self,
-        (k, effect): (usize, &UntestedEffect),
+        (first, effects): (usize, &[&UntestedEffect]),
         design: &Design,
         seen: &Seen,
         postures: &[MovedPoint],
-    ) -> Direction {
-        let b: DVector<f64> = design.b.column(k).into();
-        let step = &self.covariance * &b;
-        let information = (design.own[k] - b.dot(&step)).max(0.0);
-        let v = 1.0 / (information / self.level + effect.sigma.powi(-2));
-        let estimate = -v * (seen.score[k] + b.dot(&self.shift)) / self.level;
-        let at = postures.iter().zip(&effect.at_postures);
-        let at = at.map(|(posture, value)| posture.displacement(effect.moves) * *value);
-        Direction {
-            displaced: self.displaced(&step, at),
-            size: (estimate, v.sqrt()),
+    ) -> Vec<Direction> {
+        let b = design.b.columns(first, effects.len());
+        let steps = &self.covariance * b;
+        // d_m − G_m H⁻¹b
+        let mut displaced = -(&self.g * &steps);
+        let mut sizes = Vec::new();
+        for (i, effect) in effects.iter().enumerate() {
+            let (k, b) = (first + i, b.column(i));
+            let information = (design.own[k] - b.dot(&steps.column(i))).max(0.0);
+            let v = 1.0 / (information / self.level + effect.sigma.powi(-2));
+            let estimate = -v * (seen.score[k] + b.dot(&self.shift)) / self.level;
+            sizes.push((estimate, v.sqrt()));
+            let at = postures.iter().zip(&effect.at_postures);
+            let at = at.map(|(posture, value)| posture.displacement(effect.moves) * *value);
+            add_motion(&mut displaced.column_mut(i), at);
         }
+        self.directions(displaced, sizes)
     }
 
     /// Equation (4) with a cause.
-    fn with(&self, mu: &DVector<f64>, cause: &[Direction]) -> OpenError {
+    fn with(&self, mu: &Displacement, cause: &[Direction]) -> OpenError {
         let mut mu = mu.clone();
         let mut more = Vec::new();
-        for direction in cause {
-            mu.axpy(direction.size.0, &direction.displaced, 1.0);
+        for Direction { displaced, size } in cause {
+            mu.add(size.0, displaced);
             // `level` is in σ already.
-            more.push(&direction.displaced * (direction.size.1 / self.level.sqrt()));
+            more.push(displaced.scaled(size.1 / self.level.sqrt()));
         }
         self.open(&mu, &more)
     }
 
     /// Equation (4) with mean `mu` and more directions, each per standard deviation.
-    fn error(&self, mu: &DVector<f64>, more: &[DVector<f64>]) -> (f64, f64) {
-        let mut trace = self.gram.trace();
-        let mut squares = self.gram.norm_squared();
-        let mut along = self.moved.tr_mul(mu).norm_squared();
-        for (i, d) in more.iter().enumerate() {
+    fn error(&self, mu: &Displacement, more: &[Displacement]) -> (f64, f64) {
+        let mut trace = self.open.trace();
+        let mut squares = self.open.norm_squared();
+        let mut along = mu.along();
+        for (i, Displacement { d, .. }) in more.iter().enumerate() {
             trace += d.norm_squared();
-            squares += d.norm_squared().powi(2) + 2.0 * self.moved.tr_mul(d).norm_squared();
+            squares += d.norm_squared().powi(2) + 2.0 * more[i].along();
             for other in &more[..i] {
-                squares += 2.0 * d.dot(other).powi(2);
+                squares += 2.0 * d.dot(&other.d).powi(2);
             }
-            along += d.dot(mu).powi(2);
+            along += d.dot(&mu.d).powi(2);
         }
         let (joints, spread) = self.joints;
-        let mean = self.level * trace + mu.norm_squared() + joints;
+        let mean = self.level * trace + mu.d.norm_squared() + joints;
         let variance = 2.0 * self.level.powi(2) * squares + 4.0 * self.level * along + spread;
         (mean, variance)
     }
@@ -243,12 +280,21 @@ impl Common {
         (mean * f_quantile(freedom, self.freedom)).sqrt()
     }
 
-    fn open(&self, mu: &DVector<f64>, more: &[DVector<f64>]) -> OpenError {
+    fn open(&self, mu: &Displacement, more: &[Displacement]) -> OpenError {
         let (mean, variance) = self.error(mu, more);
         OpenError {
             rms: mean.max(0.0).sqrt(),
             upper: self.upper(mean, variance),
         }
+    }
+}
+
+/// Adds d_m/√M to what is displaced over all postures.
+fn add_motion(to: &mut DVectorViewMut<'_, f64>, at: impl Iterator<Item = Vector3<f64>>) {
+    let root = (to.len() as f64 / 3.0).sqrt();
+    for (m, moved) in at.enumerate() {
+        let mut place = to.rows_mut(3 * m, 3);
+        place += moved / root;
     }
 }
 
@@ -289,13 +335,21 @@ impl Solution {
         let design = Design::of(&columns, objective, samples, most, &mut changes);
         let seen = Seen::of(&columns, objective, samples);
         let common = self.common(&design, &seen, postures)?;
-        let of_effect = |effect| common.of_effect(effect, &design, &seen, postures);
-        let mut of_effects = effects.iter().copied().enumerate().map(of_effect);
+        let of_chunk = |(k, chunk): (usize, &[&UntestedEffect])| {
+            common.of_effects((k * CHUNK, chunk), &design, &seen, postures)
+        };
+        let of_effects: Vec<Vec<Direction>> =
+            effects.par_chunks(CHUNK).enumerate().map(of_chunk).collect();
+        let mut of_effects = of_effects.into_iter().flatten();
         let mut of_changes = changes.iter().map(|changed| match changed {
             Some(changed) => changed.directions(&common, postures),
             None => Vec::new(),
         });
         let mu = &common.g * &common.shift;
+        let mu = Displacement {
+            open: &common.open * &mu,
+            d: mu,
+        };
         let mut out = OpenErrors {
             stated: common.stated,
             joints: common.joints.0.sqrt(),
@@ -347,15 +401,22 @@ impl Solution {
             let own = &posture.point.jacobian / root;
             g.view_mut((3 * m, 0), (3, n)).copy_from(&own);
         }
-        let covariance = covariance_of(&design.all(self))?;
-        let before = covariance_of(&design.fitted(self))?;
+        let (covariance, before) = rayon::join(
+            || covariance_of(&design.all(self)),
+            || covariance_of(&design.fitted(self)),
+        );
+        let (covariance, before) = (covariance?, before?);
         // What the fit states against what independent noise gives: above 1 where the noise has a memory.
         let spread = |c: &DMatrix<f64>| (&g * c).dot(&g);
-        let stated = spread(&self.information.covariance);
-        let level = (stated / spread(&before)).max(1.0);
-        let half = covariance.clone().cholesky()?.l();
-        let moved = &g * half;
-        let gram = moved.tr_mul(&moved);
+        let ((stated, fitted), (moved, open)) = rayon::join(
+            || (spread(&self.information.covariance), spread(&before)),
+            || {
+                let moved = &g * &covariance;
+                let open = &moved * g.transpose();
+                (moved, open)
+            },
+        );
+        let level = (stated / fitted).max(1.0);
         let shift = -(&covariance * seen.gradient(self));
         Some(Common {
             g,
@@ -363,7 +424,7 @@ impl Solution {
             covariance,
             fitted: before,
             moved,
-            gram,
+            open,
             level: if level.is_finite() { level } else { 1.0 },
             freedom: self.degrees_of_freedom,
             stated: stated.max(0.0).sqrt(),

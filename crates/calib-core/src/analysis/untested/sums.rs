@@ -135,12 +135,16 @@ impl Design {
             };
             s.a.add_gram(factor, h);
             let motions = columns.at(sample, &s, &work);
-            let of =
-                |i: usize, k: usize| motions[(i, columns.of[k])] * effects[k].at_samples[place];
-            let own = DMatrix::from_fn(s.w.len(), effects.len(), of);
-            s.a.add_transposed_times(factor, &own, &mut out.b);
-            for (sum, column) in out.own.iter_mut().zip(own.column_iter()) {
-                *sum += factor * column.norm_squared();
+            // An effect is a motion times its regressor.
+            let along = s.a.transposed_times(&motions);
+            let squares: Vec<f64> = motions.column_iter().map(|c| c.norm_squared()).collect();
+            for (k, (effect, &motion)) in effects.iter().zip(&columns.of).enumerate() {
+                let value = effect.at_samples[place];
+                if value != 0.0 {
+                    let mut b = out.b.column_mut(k);
+                    b.axpy(factor * value, &along.column(motion), 1.0);
+                    out.own[k] += factor * value * value * squares[motion];
+                }
             }
             for changed in changes.iter_mut().flatten() {
                 changed.add(solution, (sample, &s), factor, &work);

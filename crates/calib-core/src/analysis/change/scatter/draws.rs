@@ -7,7 +7,7 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use crate::solve::cholesky::{cholesky_in_place, solve_in_place};
+use calib_geometry::decompose::{cholesky_in_place, solve_in_place};
 
 /// What draws are seen with: the diagonal Σ G̃ᵀG̃, and F, unknowns × draws.
 pub(super) struct Draws {

@@ -121,8 +121,8 @@ fn parts_say_what_the_whole_says() {
     assert!(near(&[a.cost(), a_cost], &[b.cost(), b_cost]));
     assert!(near(&a_scored.theta, &b_scored.theta));
     assert!(near(
-        a_seen.singular_values.as_slice(),
-        b_seen.singular_values.as_slice()
+        a_seen.singular_values().as_slice(),
+        b_seen.singular_values().as_slice()
     ));
     assert!(near(
         a_seen.covariance.as_slice(),

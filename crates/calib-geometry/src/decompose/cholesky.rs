@@ -1,12 +1,14 @@
-//! L of a positive definite matrix = L Lᵀ, in place.
+//! L of a positive definite matrix = L Lᵀ, in place, and what follows from it.
 
 use std::ops::Range;
 
-use calib_geometry::decompose::dot;
 use nalgebra::DMatrix;
 
-/// Lower Cholesky factor in place (row-major, lower triangle): columns block by block, what earlier blocks take from them as one product.
-pub(crate) fn cholesky_in_place(a: &mut [f64], n: usize) -> bool {
+use super::dot;
+
+/// Lower Cholesky factor in place (row-major, lower triangle): columns block by block, what earlier blocks take from them as one product. `false`
+/// where the n × n matrix is not positive definite.
+pub fn cholesky_in_place(a: &mut [f64], n: usize) -> bool {
     /// Columns of a block.
     const BLOCK: usize = 64;
     for first in (0..n).step_by(BLOCK) {
@@ -49,8 +51,8 @@ fn take_earlier(a: &mut [f64], n: usize, block: Range<usize>) {
     }
 }
 
-/// y ← (L Lᵀ)⁻¹ y.
-pub(crate) fn solve_in_place(l: &[f64], n: usize, y: &mut [f64]) {
+/// y ← (L Lᵀ)⁻¹ y, L row by row.
+pub fn solve_in_place(l: &[f64], n: usize, y: &mut [f64]) {
     for i in 0..n {
         let sum = dot(&l[i * n..i * n + i], &y[..i]);
         y[i] = (y[i] - sum) / l[i * n + i];
@@ -62,6 +64,39 @@ pub(crate) fn solve_in_place(l: &[f64], n: usize, y: &mut [f64]) {
             y[j] -= l[i * n + j] * yi;
         }
     }
+}
+
+/// L⁻¹ of a lower triangular L (n × n), both row by row.
+#[must_use]
+pub fn lower_inverse(l: &[f64], n: usize) -> Vec<f64> {
+    let mut out = vec![0.0; n * n];
+    for i in 0..n {
+        // row i of L⁻¹ = (e_i − Σ_j<i L_ij row j) / L_ii
+        let (done, rest) = out.split_at_mut(i * n);
+        let row = &mut rest[..=i];
+        for (j, &factor) in l[i * n..i * n + i].iter().enumerate() {
+            if factor != 0.0 {
+                let above = &done[j * n..=j * n + j];
+                row.iter_mut()
+                    .zip(above)
+                    .for_each(|(x, y)| *x -= factor * y);
+            }
+        }
+        row[i] = 1.0;
+        let d = 1.0 / l[i * n + i];
+        row.iter_mut().for_each(|x| *x *= d);
+    }
+    out
+}
+
+/// W, upper triangular, with `W Wᵀ = A⁻¹`; `None` where A is not positive definite.
+#[must_use]
+pub fn inverse_root(a: &DMatrix<f64>) -> Option<DMatrix<f64>> {
+    let n = a.nrows();
+    // A is its own transpose: column after column is row after row.
+    let mut l = a.as_slice().to_vec();
+    // Row after row of L⁻¹ is column after column of its transpose.
+    cholesky_in_place(&mut l, n).then(|| DMatrix::from_vec(n, n, lower_inverse(&l, n)))
 }
 
 #[cfg(test)]
@@ -76,12 +111,14 @@ mod tests {
             let matrix = &b * b.transpose() + DMatrix::identity(n, n);
             let mut a: Vec<f64> = matrix.iter().copied().collect();
             assert!(cholesky_in_place(&mut a, n));
+            let w = inverse_root(&matrix).unwrap();
+            let identity = DMatrix::identity(n, n);
+            assert!((w.transpose() * &matrix * w - identity).amax() < 1e-12 * n as f64);
             let l = DMatrix::from_row_slice(n, n, &a).lower_triangle();
             assert!((&l * l.transpose() - &matrix).amax() < 1e-12 * n as f64 * matrix.amax());
             let mut indefinite = matrix;
             indefinite[(n - 1, n - 1)] = -1.0;
-            let mut a: Vec<f64> = indefinite.iter().copied().collect();
-            assert!(!cholesky_in_place(&mut a, n));
+            assert!(inverse_root(&indefinite).is_none());
         }
     }
 }
