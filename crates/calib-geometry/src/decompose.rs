@@ -8,11 +8,13 @@
 
 use nalgebra::{DMatrix, DVector, SMatrix, SVector};
 
+mod bordered;
 mod cholesky;
 mod jacobi;
 mod null_space;
 
-pub use cholesky::{cholesky_in_place, inverse_root, lower_inverse, solve_in_place};
+pub use bordered::{InverseRoot, inverse_root};
+pub use cholesky::{cholesky_in_place, lower_inverse, solve_in_place};
 pub use jacobi::dot;
 pub use null_space::{NullSpace, null_space};
 use jacobi::{cyclic_jacobi, one_sided_jacobi};

@@ -94,9 +94,7 @@ pub fn run_on(
         held_out: verified.held_out.as_ref(),
         fit,
     };
-    let view = view(&inputs, tracks, &shown, solids);
-    let alone = refitted.map(|robot| patch_urdf(&inputs, &robot, &BTreeMap::new()));
-    let mut report = assemble(&Evidence {
+    let evidence = Evidence {
         inputs: &inputs,
         tracks,
         method,
@@ -107,12 +105,20 @@ pub fn run_on(
         causes: &verified.causes,
         robot,
         loops: verified.loops,
-        held_out: verified.held_out,
+        held_out: verified.held_out.as_ref(),
         urdf: &urdf,
         residuals: &verified.residuals,
         selection: chosen.map(|chosen| chosen.fitted(fit)),
         arguments: options.arguments(),
-    });
+    };
+    let ((view, alone), mut report) = rayon::join(
+        || {
+            let view = view(&inputs, tracks, &shown, solids);
+            let alone = refitted.map(|robot| patch_urdf(&inputs, &robot, &BTreeMap::new()));
+            (view, alone)
+        },
+        || assemble(&evidence),
+    );
     let scene = scene(&inputs, tracks, &solved, &report);
     let robots = Robots {
         urdf: &urdf,

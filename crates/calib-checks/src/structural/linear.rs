@@ -5,7 +5,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
-use calib_geometry::decompose::inverse_root;
+use calib_geometry::decompose::{InverseRoot, inverse_root};
 use nalgebra::{DMatrix, DVector, Vector3};
 use rayon::prelude::*;
 
@@ -369,7 +369,7 @@ pub(crate) fn moving_joints(data: &Data) -> Vec<usize> {
 /// The MAP solution of a whitened model.
 pub(crate) struct Map {
     pub x: DVector<f64>,
-    /// W with W Wᵀ = N⁻¹, upper triangular.
+    /// W with W Wᵀ = N⁻¹.
     pub root: DMatrix<f64>,
     pub chi2: f64,
     pub log_likelihood: f64,
@@ -401,11 +401,14 @@ pub(crate) fn solve(
     }
     let ridge = RIDGE * n.diagonal().amax();
     (0..p).for_each(|a| n[(a, a)] += ridge);
-    let root = inverse_root(&n)?;
+    let InverseRoot {
+        root,
+        log_det: log_n,
+        ..
+    } = inverse_root(&n)?;
     let x = &root * root.tr_mul(&rhs);
     let chi2 = (sums.gram[(last, last)] + prior_chi2 - rhs.dot(&x)).max(f64::MIN_POSITIVE);
     let freedom = (sums.observations - m as f64).max(1.0);
-    let log_n: f64 = root.diagonal().iter().map(|x| -2.0 * x.ln()).sum();
     let log_prior: f64 = precision.iter().map(|x| x.ln()).sum();
     // −2 ln L_REML = ν ln χ² + ln|V| + ln|N| − ln|P|
     let log_likelihood = -0.5 * (freedom * chi2.ln() + sums.log_det + log_n - log_prior);
@@ -443,7 +446,7 @@ pub(crate) fn projected(
     let mut n = gram.view((0, 0), (m, m)).into_owned();
     let ridge = RIDGE * n.diagonal().amax().max(f64::MIN_POSITIVE);
     (0..m).for_each(|a| n[(a, a)] += ridge);
-    let half = inverse_root(&n)?.transpose() * cross;
+    let half = inverse_root(&n)?.root.transpose() * cross;
     Some(own - half.transpose() * half)
 }
 

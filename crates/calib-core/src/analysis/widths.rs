@@ -198,14 +198,15 @@ impl Solution {
 fn information(s: &DMatrix<f64>) -> DMatrix<f64> {
     /// What the data know better than this, relative to the prior's variance, they know.
     const KNOWN: f64 = 1e-10;
-    /// Below this S⁻¹ is right to 8 digits, and is all there is to ask for…
-    const CLEAR: f64 = 1e8;
-    /// …where it is no less than 1 by more than rounding.
-    const ROUNDING: f64 = 1e-7;
+    /// Where S⁻¹ is no less than 1 by more than its rounding, it is all there is to ask for.
+    const ROUNDING: f64 = 1e-5;
     let n = s.nrows();
     let one = DMatrix::identity(n, n);
-    if let Some(root) = inverse_root(s).filter(|root| root.norm_squared() < CLEAR) {
-        let m = &root * root.transpose() - &one;
+    // No eigenvalue of S⁻¹ is larger than its trace.
+    let all_known = |inverse: &DMatrix<f64>| inverse.trace() * KNOWN < 1.0;
+    let inverse = inverse_root(s).map(|root| root.inverse());
+    if let Some(inverse) = inverse.filter(all_known) {
+        let m = inverse - &one;
         if inverse_root(&(&m + one * ROUNDING)).is_some() {
             return m;
         }
@@ -312,9 +313,9 @@ impl Evidence {
             precision[(i, i)] += d * d;
         }
         let root = inverse_root(&precision)?;
-        let z = &root * root.tr_mul(&self.b);
-        let half_log_det: f64 = -root.diagonal().iter().map(|r| r.ln()).sum::<f64>();
-        let covariance = &root * root.transpose();
+        let half_log_det = 0.5 * root.log_det;
+        let covariance = root.inverse();
+        let z = &covariance * &self.b;
         let w = DMatrix::from_fn(n, n, |i, j| {
             f64::from(u8::from(i == j)) - inverse[i] * covariance[(i, j)] * inverse[j]
         });

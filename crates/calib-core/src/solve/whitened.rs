@@ -4,7 +4,7 @@
 //! V_s = L Lᵀ,   A_s = L⁻¹ J_s,   w_s = L⁻¹ e_s,   C = H⁻¹                                     (1)
 //! ```
 
-use calib_geometry::decompose::{cholesky_in_place, lower_inverse};
+use calib_geometry::decompose::{InverseRoot, inverse_root, lower_inverse};
 use nalgebra::{DMatrix, DVector};
 
 use crate::model::cache::State;
@@ -16,13 +16,27 @@ use crate::solve::rows::SampleRows;
 
 /// C of equation (1), (H + tiny ridge)⁻¹: directions that nothing determines have A v = 0 and do not matter in A C Aᵀ.
 pub(crate) fn covariance_of(system: &NormalEquations) -> Option<DMatrix<f64>> {
-    let root = root_of(system)?;
-    let transposed = root.transpose();
-    Some(root * transposed)
+    let (root, scale) = scaled_root(system)?;
+    let mut c = root.inverse();
+    for (mut column, s) in c.column_iter_mut().zip(&scale) {
+        let of_rows = column.iter_mut().zip(&scale);
+        of_rows.for_each(|(x, r)| *x *= r * s);
+    }
+    Some(c)
 }
 
-/// R of C = R Rᵀ, upper triangular.
+/// R of C = R Rᵀ.
 pub(crate) fn root_of(system: &NormalEquations) -> Option<DMatrix<f64>> {
+    let (InverseRoot { mut root, .. }, scale) = scaled_root(system)?;
+    for mut column in root.column_iter_mut() {
+        let of_rows = column.iter_mut().zip(&scale);
+        of_rows.for_each(|(x, s)| *x *= s);
+    }
+    Some(root)
+}
+
+/// W and S of C = S W Wᵀ S.
+fn scaled_root(system: &NormalEquations) -> Option<(InverseRoot, Vec<f64>)> {
     /// Relative ridge: far below any direction that influences a prediction.
     const RIDGE: f64 = 1e-11;
     let n = system.n;
@@ -32,31 +46,24 @@ pub(crate) fn root_of(system: &NormalEquations) -> Option<DMatrix<f64>> {
             if d > 0.0 { 1.0 / d.sqrt() } else { 1.0 }
         })
         .collect();
-    let mut l = vec![0.0; n * n];
+    let mut scaled = DMatrix::zeros(n, n);
     for i in 0..n {
         for j in 0..i {
-            l[i * n + j] = system.h[j * n + i] * scale[i] * scale[j];
+            let x = system.h[j * n + i] * scale[i] * scale[j];
+            (scaled[(i, j)], scaled[(j, i)]) = (x, x);
         }
-        l[i * n + i] = 1.0 + RIDGE;
     }
     let mut ridge = RIDGE;
-    let full = l.clone();
-    while !cholesky_in_place(&mut l, n) {
+    loop {
+        scaled.fill_diagonal(1.0 + ridge);
+        if let Some(root) = inverse_root(&scaled) {
+            return Some((root, scale));
+        }
         ridge *= 10.0;
         if ridge > 1e-6 {
             return None;
         }
-        l.copy_from_slice(&full);
-        for i in 0..n {
-            l[i * n + i] = 1.0 + ridge;
-        }
     }
-    // R = S L⁻ᵀ; row after row of L⁻¹ is column after column of its transpose.
-    let mut inverse = lower_inverse(&l, n);
-    for row in inverse.chunks_exact_mut(n.max(1)) {
-        row.iter_mut().zip(&scale).for_each(|(x, s)| *x *= s);
-    }
-    Some(DMatrix::from_vec(n, n, inverse))
 }
 
 /// One sample in whitened form, V = LLᵀ: A = L⁻¹J (m × n), w (m), L⁻¹ (m × m).

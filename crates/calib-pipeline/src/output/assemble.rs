@@ -43,11 +43,11 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         .flat_map(|g| &g.missing)
         .map(missing_physics)
         .collect();
-    let open = weak::findings(e.inputs, weak.as_ref(), e.held_out.as_ref());
+    let open = weak::findings(e.inputs, weak.as_ref(), e.held_out);
     let findings = findings(e, &missing, open);
     let joint_sigma = e.fit.and_then(MlFit::joint_sigma).unwrap_or(0.0);
     let motions = motions(e.inputs, joint_sigma);
-    let tracks = fates(e.inputs, e.tracks, e.fit, e.held_out.as_ref());
+    let tracks = fates(e.inputs, e.tracks, e.fit, e.held_out);
     let limits = limits(&profile.solve.limits, e);
     let (judgment, residuals) = rayon::join(
         || judge(&facts(e, &findings, &limits, &motions, &tracks)),
@@ -94,9 +94,9 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         clocks: crate::formulate::clock::clocks(e.inputs, e.fit),
         recordings: recordings(e.inputs, &tracks),
         coverage: coverage(e.inputs),
-        rejected: rejected(e.inputs, e.fit, e.held_out.as_ref()),
+        rejected: rejected(e.inputs, e.fit, e.held_out),
         accuracy_limits: e.fit.map_or_else(Vec::new, |fit| {
-            accuracy_limits(e.inputs, e.held_out.as_ref(), fit, e.causes.lacks_effects())
+            accuracy_limits(e.inputs, e.held_out, fit, e.causes.lacks_effects())
         }),
         weak_directions: weak,
         selection: e.selection.clone(),
@@ -181,7 +181,7 @@ fn verification(e: &Evidence<'_>, verdict: Verdict) -> Verification {
 
 /// The held-out errors with the share of the tracker's noise.
 fn held_out(e: &Evidence<'_>) -> Option<HeldOut> {
-    let mut held_out = e.held_out.clone()?;
+    let mut held_out = e.held_out.cloned()?;
     let tracker_m = e
         .fit
         .and_then(|fit| TrackerNoise::of(fit, e.causes.lacks_effects()).over(e.inputs, &held_out));

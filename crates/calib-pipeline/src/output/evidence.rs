@@ -40,7 +40,7 @@ pub struct Evidence<'a> {
     /// Loop closures.
     pub loops: Vec<LoopClosure>,
     /// Held-out errors.
-    pub held_out: Option<HeldOut>,
+    pub held_out: Option<&'a HeldOut>,
     /// The patched description.
     pub urdf: &'a PatchedUrdf,
     /// Residuals of the fit.

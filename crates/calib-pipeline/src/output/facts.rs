@@ -30,7 +30,7 @@ pub(crate) fn facts(
     motions: &Motions,
     tracks: &Tracks,
 ) -> VerdictFacts {
-    let held_out = e.held_out.as_ref();
+    let held_out = e.held_out;
     let left_out = held_out.is_some_and(|h| h.left_out);
     let undetermined = e.origins.iter();
     let undetermined = undetermined.filter(|(_, origin)| origin.pose.is_none() && e.fit.is_none());

@@ -14,7 +14,8 @@ use calib_profile::Usage;
 use calib_report::Scene;
 use calib_report::scene::SceneVerdict;
 use calib_urdf::{Joint, JointId, JointKind, RobotModel};
-use nalgebra::{DMatrix, Isometry3, Point3, Vector3};
+use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
+use rayon::prelude::*;
 
 use crate::formulate::formulation::MlFit;
 use crate::formulate::kinematics::{Calibration, motion_axis};
@@ -264,18 +265,19 @@ fn uncertainty(inputs: &Inputs, fit: &MlFit) -> ModelUncertainty {
     let base = calibration_at(&fit.formulation, &solution.model, &solution.values, inputs);
     let named = names(&base);
     let scale = &solution.information.scale;
-    let mut g = DMatrix::zeros(named.len(), scale.len());
-    for p in 0..solution.parameters.len() {
-        let Some(column) = solution.column_of(p) else {
-            continue;
-        };
+    let column_of = |p: usize| -> Option<(usize, DVector<f64>)> {
+        let column = solution.column_of(p)?;
         let step = STEP * scale[column];
         let mut values = solution.values.clone();
         values.0[p] += step;
         let moved = calibration_at(&fit.formulation, &solution.model, &values, inputs);
-        for (row, change) in changes(&base, &moved).into_iter().enumerate() {
-            g[(row, column)] = change / step;
-        }
+        Some((column, DVector::from_vec(changes(&base, &moved)) / step))
+    };
+    let columns = (0..solution.parameters.len()).into_par_iter();
+    let columns: Vec<(usize, DVector<f64>)> = columns.filter_map(column_of).collect();
+    let mut g = DMatrix::zeros(named.len(), scale.len());
+    for (column, own) in columns {
+        g.set_column(column, &own);
     }
     let root = g * solution.half_covariance();
     let rows = named.into_iter().zip(root.row_iter());

@@ -13,7 +13,7 @@ use crate::verify::motions::Motions;
 
 pub(crate) fn limits(limits: &Limits, e: &Evidence<'_>) -> Vec<Limit> {
     let mut out = Vec::new();
-    let over_all = e.held_out.as_ref().and_then(|h| h.left_out_over_all);
+    let over_all = e.held_out.and_then(|h| h.left_out_over_all);
     // (limit, what it is about, value and its interval)
     type Value = Option<(f64, Option<(f64, f64)>)>;
     let mut compare = |limit: Option<f64>, of: Limited, value: Value| {
@@ -25,7 +25,7 @@ pub(crate) fn limits(limits: &Limits, e: &Evidence<'_>) -> Vec<Limit> {
             None => of.unknown(limit),
         });
     };
-    let held_out = e.held_out.as_ref();
+    let held_out = e.held_out;
     let left_out = held_out.is_some_and(|h| h.left_out);
     let position = held_out.and_then(|h| h.calibrated);
     let angle = held_out
@@ -104,7 +104,7 @@ pub(crate) fn scope(e: &Evidence<'_>, motions: &Motions) -> Vec<Scope> {
         }
         None => {}
     }
-    let refitted = e.held_out.as_ref().and_then(|h| h.urdf_refitted);
+    let refitted = e.held_out.and_then(|h| h.urdf_refitted);
     let alone = refitted.map(|_| alone_name(&e.inputs.robot.profile.outputs.urdf));
     scope.extend(effects_file(e).map(|file| Scope::EffectsOf { file, alone }));
     if e.method == Method::Paper {
@@ -125,7 +125,7 @@ pub(crate) fn next_steps(
     missing: &[MissingPhysics],
 ) -> Vec<NextStep> {
     let has_limits = e.inputs.robot.profile.solve.limits != Limits::default();
-    let has_validation = e.held_out.as_ref().is_some_and(|h| !h.left_out);
+    let has_validation = e.held_out.is_some_and(|h| !h.left_out);
     let unchanged = e.urdf.changes.is_empty() && effects_file(e).is_none();
     let no_better = ReasonId::NotBetterThanRegistration;
     let gains = !judgment.reasons.iter().any(|r| r.id == no_better);

@@ -2,7 +2,7 @@
 
 use super::{Plot, PlotKind};
 use crate::{Class, DataInformation, Report, number};
-use calib_geometry::decompose::{inverse_root, semidefinite_eigen};
+use calib_geometry::decompose::{InverseRoot, inverse_root, semidefinite_eigen};
 use nalgebra::{DMatrix, DVector};
 
 /// Parameters in the picture: more are not readable.
@@ -100,9 +100,9 @@ fn root(of: &DataInformation) -> Option<DMatrix<f64>> {
         return None;
     }
     // No eigenvalue is larger than the trace, and none smaller than 1/|W|².
-    let determined = |root: &DMatrix<f64>| root.norm_squared() * h.trace() * OPEN < 1.0;
-    if let Some(root) = inverse_root(&h).filter(determined) {
-        return Some(root);
+    let determined = |of: &InverseRoot| of.root.norm_squared() * h.trace() * OPEN < 1.0;
+    if let Some(of) = inverse_root(&h).filter(determined) {
+        return Some(of.root);
     }
     let eigen = semidefinite_eigen(&h);
     let least = OPEN * eigen.values.iter().fold(0.0_f64, |a, b| a.max(*b));

@@ -332,8 +332,10 @@ impl Solution {
             ..self.objective()
         };
         let columns = Columns::new(self, &effects);
-        let design = Design::of(&columns, objective, samples, most, &mut changes);
-        let seen = Seen::of(&columns, objective, samples);
+        let (design, seen) = rayon::join(
+            || Design::of(&columns, objective, samples, most, &mut changes),
+            || Seen::of(&columns, objective, samples),
+        );
         let common = self.common(&design, &seen, postures)?;
         let of_chunk = |(k, chunk): (usize, &[&UntestedEffect])| {
             common.of_effects((k * CHUNK, chunk), &design, &seen, postures)

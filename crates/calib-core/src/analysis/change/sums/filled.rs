@@ -203,8 +203,8 @@ impl Design {
         self.cost += system.prior - along.norm_squared();
         let of_candidates = self.cumulative.par_iter_mut().zip(&mut self.u);
         of_candidates.for_each(|(sums, us)| {
-            for (sum, mut u) in sums.iter_mut().zip(us.column_iter_mut()) {
-                sum.f = root * &sum.f;
+            times(root, sums);
+            for (sum, mut u) in sums.iter().zip(us.column_iter_mut()) {
                 u -= sum.f.tr_mul(&along);
             }
         });
@@ -214,5 +214,28 @@ impl Design {
             }
         }
         (self.cost.is_finite() && self.rows > 0.0).then_some(())
+    }
+}
+
+/// f ← Rᵀ f of all sums of a candidate, as one product over the rows that it has: what a limb moves concerns no other.
+fn times(root: &DMatrix<f64>, sums: &mut [Sum]) {
+    let Some(first) = sums.first() else { return };
+    let (n, d) = first.f.shape();
+    let concerns = |r: &usize| sums.iter().any(|sum| sum.f.row(*r).iter().any(|x| *x != 0.0));
+    let rows: Vec<usize> = (0..n).filter(concerns).collect();
+    let mut all = DMatrix::zeros(rows.len(), d * sums.len());
+    for (k, sum) in sums.iter().enumerate() {
+        for c in 0..d {
+            for (i, &r) in rows.iter().enumerate() {
+                all[(i, d * k + c)] = sum.f[(r, c)];
+            }
+        }
+    }
+    let product = match rows.len() == n {
+        true => root * all,
+        false => root.select_columns(&rows) * all,
+    };
+    for (k, sum) in sums.iter_mut().enumerate() {
+        sum.f.copy_from(&product.columns(d * k, d));
     }
 }
