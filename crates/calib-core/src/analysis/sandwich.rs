@@ -187,7 +187,7 @@ fn adjusted_score(
     let s = whitened(objective, values, sample, work)?;
     let m = s.w.len();
     // I − Q = U diag(λ) Uᵀ
-    let (_, taken) = s.a.between(c);
+    let taken = s.a.gram_with(c);
     let eigen = (DMatrix::identity(m, m) - taken).symmetric_eigen();
     // (I − Q)^(-½) w = U diag(λ^(-½)) Uᵀ w
     let mut coefficients = eigen.eigenvectors.tr_mul(&s.w);

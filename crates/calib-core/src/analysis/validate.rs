@@ -305,19 +305,26 @@ fn prediction(
     left_out: bool,
 ) -> Result<SamplePrediction, Indispensable> {
     let m = s.w.len();
-    let (_, q) = s.a.between(c);
-    let with_all = &s.l * (DMatrix::identity(m, m) + &q);
+    let q = s.a.gram_with(c);
+    let with_all = DMatrix::identity(m, m) + &q;
     let predicted = Predicted::new(q, &s.w, left_out).ok_or(Indispensable(sample))?;
     let log_det = s.log_det + predicted.log_det;
     let z2 = predicted.z2;
     let e = &s.l * &predicted.error;
-    let own = &s.l * predicted.covariance;
     let vector = |&(observation, first, rows): &(usize, usize, usize)| {
-        let l = s.l.rows(first, rows);
-        let covariance = own.rows(first, rows) * l.transpose();
-        let variances = (first..first + rows).map(|i| with_all.row(i).dot(&s.l.row(i)));
+        // Of the rows of L those of one limb need few columns.
+        let end = first + rows;
+        let is_empty = |c: &usize| (first..end).all(|r| s.l[(r, *c)] == 0.0);
+        let start = (0..first).take_while(is_empty).count();
+        let l = s.l.view((first, start), (rows, end - start)).into_owned();
+        let with = |p: &DMatrix<f64>| -> DMatrix<f64> {
+            let own = p.view((start, start), (end - start, end - start));
+            &l * (own.into_owned() * l.transpose())
+        };
+        let covariance = with(&predicted.covariance);
+        let variances = with(&with_all).diagonal().iter().copied().collect();
         let error = e.rows(first, rows).into_owned();
-        vector_error(model, observation, error, covariance, variances.collect())
+        vector_error(model, observation, error, covariance, variances)
     };
     Ok(SamplePrediction {
         sample,

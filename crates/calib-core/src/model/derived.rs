@@ -368,7 +368,14 @@ impl Solution {
         if leak.amax() > ESTIMABLE {
             return None;
         }
-        Some(f * &self.information.covariance * f.transpose())
+        // Most columns of a long robot concern other limbs.
+        let concern = |c: &usize| f.column(*c).iter().any(|x| *x != 0.0);
+        let columns: Vec<usize> = (0..f.ncols()).filter(concern).collect();
+        let (f, covariance) = (f.select_columns(&columns), &self.information.covariance);
+        let own = DMatrix::from_fn(columns.len(), columns.len(), |i, k| {
+            covariance[(columns[i], columns[k])]
+        });
+        Some(&f * own * f.transpose())
     }
 
     /// Orthonormal basis of the directions of F's image that only the prior fixes.

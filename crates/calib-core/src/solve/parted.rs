@@ -189,6 +189,28 @@ impl Parted {
         (ac, out)
     }
 
+    /// A C Aᵀ
+    pub(crate) fn gram_with(&self, c: &DMatrix<f64>) -> DMatrix<f64> {
+        if self.blocks.iter().any(|b| b.part.columns.len() == self.n) {
+            return self.between(c).1;
+        }
+        let mut out = DMatrix::zeros(self.m, self.m);
+        for (k, right) in self.blocks.iter().enumerate() {
+            for left in &self.blocks[..=k] {
+                let (rows, columns) = (&left.part.columns, &right.part.columns);
+                let of = |i: usize, j: usize| c[(rows[i], columns[j])];
+                let own = DMatrix::from_fn(rows.len(), columns.len(), of);
+                let own = &left.a * (own * &right.transposed);
+                for (j, &column) in right.rows.iter().enumerate() {
+                    for (i, &row) in left.rows.iter().enumerate() {
+                        (out[(row, column)], out[(column, row)]) = (own[(i, j)], own[(i, j)]);
+                    }
+                }
+            }
+        }
+        out
+    }
+
     /// (A C Aᵀ)_ii
     pub(crate) fn squares_with(&self, c: &DMatrix<f64>) -> Vec<f64> {
         let mut out = vec![0.0; self.m];

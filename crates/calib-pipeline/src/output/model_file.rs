@@ -280,16 +280,19 @@ fn uncertainty(inputs: &Inputs, fit: &MlFit) -> ModelUncertainty {
         g.set_column(column, &own);
     }
     let root = g * solution.half_covariance();
-    let rows = named.into_iter().zip(root.row_iter());
-    let known = rows.filter(|(_, row)| row.iter().any(|x| *x != 0.0));
+    let rows = named.into_par_iter().enumerate();
+    let known = rows.filter(|(r, _)| root.row(*r).iter().any(|x| *x != 0.0));
     let (numbers, root) = known
-        .map(|(number, row)| (number, row.iter().map(|x| rounded(*x)).collect()))
+        .map(|(r, number)| (number, root.row(r).iter().map(|x| rounded(*x)).collect()))
         .unzip();
     ModelUncertainty { numbers, root }
 }
 
 /// Nine digits: more of a standard deviation says nothing.
 fn rounded(x: f64) -> f64 {
+    if x == 0.0 {
+        return 0.0;
+    }
     format!("{x:.8e}").parse().unwrap_or(x) + 0.0
 }
 

@@ -153,6 +153,8 @@ struct Common {
     moved: DMatrix<f64>,
     /// K = [G_m]_m C [G_m]_mᵀ/M, what the parameters leave open.
     open: DMatrix<f64>,
+    /// tr K and |K|².
+    of_open: (f64, f64),
     /// Factor of all variances: memory of the noise.
     level: f64,
     /// Degrees of freedom of the noise.
@@ -255,8 +257,7 @@ impl Common {
 
     /// Equation (4) with mean `mu` and more directions, each per standard deviation.
     fn error(&self, mu: &Displacement, more: &[Displacement]) -> (f64, f64) {
-        let mut trace = self.open.trace();
-        let mut squares = self.open.norm_squared();
+        let (mut trace, mut squares) = self.of_open;
         let mut along = mu.along();
         for (i, Displacement { d, .. }) in more.iter().enumerate() {
             trace += d.norm_squared();
@@ -426,6 +427,7 @@ impl Solution {
             covariance,
             fitted: before,
             moved,
+            of_open: (open.trace(), open.norm_squared()),
             open,
             level: if level.is_finite() { level } else { 1.0 },
             freedom: self.degrees_of_freedom,

@@ -1,6 +1,8 @@
 //! The sums of equation (1): those of the design from some samples, those of the residuals from all.
 
-use nalgebra::{DMatrix, DVector, Vector3, Vector6};
+use std::ops::Range;
+
+use nalgebra::{DMatrix, DVector, DVectorView, Vector3, Vector6};
 use rayon::prelude::*;
 
 use super::changed::Changed;
@@ -137,12 +139,14 @@ impl Design {
             let motions = columns.at(sample, &s, &work);
             // An effect is a motion times its regressor.
             let along = s.a.transposed_times(&motions);
+            let concerned: Vec<Range<usize>> = along.column_iter().map(concerned).collect();
             let squares: Vec<f64> = motions.column_iter().map(|c| c.norm_squared()).collect();
             for (k, (effect, &motion)) in effects.iter().zip(&columns.of).enumerate() {
-                let value = effect.at_samples[place];
-                if value != 0.0 {
-                    let mut b = out.b.column_mut(k);
-                    b.axpy(factor * value, &along.column(motion), 1.0);
+                let (value, rows) = (effect.at_samples[place], &concerned[motion]);
+                if value != 0.0 && !rows.is_empty() {
+                    let own = along.view((rows.start, motion), (rows.len(), 1));
+                    let mut b = out.b.view_mut((rows.start, k), (rows.len(), 1));
+                    b.zip_apply(&own, |sum, x| *sum += factor * value * x);
                     out.own[k] += factor * value * value * squares[motion];
                 }
             }
@@ -162,6 +166,13 @@ impl Design {
     pub(super) fn all(&self, solution: &Solution) -> NormalEquations {
         with_prior(&(&self.fitted + &self.held_out), solution)
     }
+}
+
+/// From the first to the last entry that is not 0.
+fn concerned(column: DVectorView<'_, f64>) -> Range<usize> {
+    let is = |x: &f64| *x != 0.0;
+    let end = column.as_slice().iter().rposition(is).map_or(0, |i| i + 1);
+    column.as_slice().iter().position(is).unwrap_or(end)..end
 }
 
 fn with_prior(h: &DMatrix<f64>, solution: &Solution) -> NormalEquations {

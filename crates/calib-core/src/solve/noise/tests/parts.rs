@@ -184,6 +184,10 @@ fn products_are_those_of_the_dense_matrix() {
             assert!(near(ac.as_slice(), (&a * &c).as_slice()));
             let expected = &a * &c * a.transpose();
             assert!(near(q.as_slice(), expected.as_slice()));
+            let symmetric = &c * c.transpose();
+            let expected_of = &a * &symmetric * a.transpose();
+            let found = s.a.gram_with(&symmetric);
+            assert!(near(found.as_slice(), expected_of.as_slice()));
             let diagonal: Vec<f64> = expected.diagonal().iter().copied().collect();
             assert!(near(&s.a.squares_with(&c), &diagonal));
         }
