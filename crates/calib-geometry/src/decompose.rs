@@ -13,11 +13,11 @@ mod cholesky;
 mod jacobi;
 mod null_space;
 
-pub use bordered::{InverseRoot, inverse_root};
+pub use bordered::{InverseRoot, inverse_root, solve_positive};
 pub use cholesky::{cholesky_in_place, lower_inverse, solve_in_place};
 pub use jacobi::dot;
-pub use null_space::{NullSpace, null_space};
 use jacobi::{cyclic_jacobi, one_sided_jacobi};
+pub use null_space::{NullSpace, null_space};
 
 /// Thin singular value decomposition `A = U diag(s) Vᵀ`, singular values descending.
 #[derive(Debug, Clone, PartialEq)]

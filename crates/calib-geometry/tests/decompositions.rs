@@ -1,8 +1,8 @@
 //! Every decomposition rebuilds its input, near-singular and repeated spectra included.
 
 use calib_geometry::decompose::{
-    null_space, pencil_eigen, rank, right_singular, semidefinite_eigen, singular_values, solve_least_squares,
-    square_root, svd, svd_small, symmetric_eigen,
+    null_space, pencil_eigen, rank, right_singular, semidefinite_eigen, singular_values,
+    solve_least_squares, square_root, svd, svd_small, symmetric_eigen,
 };
 use nalgebra::{DMatrix, DVector, Matrix3, Matrix5};
 use proptest::prelude::*;
@@ -191,6 +191,12 @@ fn the_null_space_is_found_where_the_rank_leaves_no_doubt() {
     }
     let doubtful = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, 1.0, 2.0 * OPEN]));
     assert_eq!(null_space(&doubtful, OPEN), None);
-    assert_eq!(null_space(&DMatrix::from_element(2, 2, f64::NAN), OPEN), None);
-    assert_eq!(null_space(&DMatrix::zeros(3, 0), OPEN).map(|n| n.rank), Some(0));
+    assert_eq!(
+        null_space(&DMatrix::from_element(2, 2, f64::NAN), OPEN),
+        None
+    );
+    assert_eq!(
+        null_space(&DMatrix::zeros(3, 0), OPEN).map(|n| n.rank),
+        Some(0)
+    );
 }

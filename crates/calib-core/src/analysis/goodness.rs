@@ -17,7 +17,8 @@ mod profile;
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector};
+use nalgebra::{DMatrix, DVector, DVectorView};
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
@@ -272,22 +273,31 @@ impl Solution {
             .collect();
         // Second pass: each sample's share of U once the effect has been taken out, so that a strong
         // effect does not count as its own noise.
-        let mut clusters = vec![0.0; count];
-        let mut chi2 = 0.0;
-        let mut share = |seen: Seen| {
+        let share = |seen: Seen| -> (f64, Vec<f64>) {
             let (s, alpha) = (&seen.rows, &seen.columns);
             let left = alpha - s.a.times(&taken);
             let moved = step.as_ref().map(|step| &s.w + s.a.times_vector(step));
             let w = moved.as_ref().unwrap_or(&s.w);
-            chi2 += w.norm_squared();
-            for (k, own) in left.column_iter().enumerate() {
+            let of_effect = |(k, own): (usize, DVectorView<'_, f64>)| {
                 let share = own.dot(w) - u[k] / information[k] * own.norm_squared();
-                clusters[k] += share * share;
-            }
+                share * share
+            };
+            let shares = left.column_iter().enumerate().map(of_effect);
+            (w.norm_squared(), shares.collect())
         };
-        match keep {
-            true => kept.into_iter().for_each(&mut share),
-            false => self.seen(candidates, samples).for_each(&mut share),
+        let mut clusters = vec![0.0; count];
+        let mut chi2 = 0.0;
+        let mut add = |(cost, shares): (f64, Vec<f64>)| {
+            chi2 += cost;
+            let sums = clusters.iter_mut().zip(shares);
+            sums.for_each(|(sum, share)| *sum += share);
+        };
+        if keep {
+            let all: Vec<(f64, Vec<f64>)> = kept.into_par_iter().map(share).collect();
+            all.into_iter().for_each(add);
+        } else {
+            self.seen(candidates, samples)
+                .for_each(|seen| add(share(seen)));
         }
         let chi2 = if looked_at.all { self.chi2 } else { chi2 };
         let excess = (self.chi2 / self.degrees_of_freedom.max(1.0)).max(1.0);

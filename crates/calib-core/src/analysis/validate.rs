@@ -20,12 +20,12 @@ use crate::graph::ids::MeasurementId;
 use crate::graph::problem::NoiseKind;
 use crate::model::layout::{Model, Observation};
 use crate::model::values::Values;
-use calib_geometry::decompose::{cholesky_in_place, lower_inverse, solve_in_place};
 use crate::solve::chunks::chunked;
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::normal::accumulate;
 use crate::solve::rows::add_block;
 use crate::solve::whitened::{Whitened, covariance_of, whitened};
+use calib_geometry::decompose::{cholesky_in_place, lower_inverse, solve_in_place};
 
 /// Prediction of one sample from the others.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

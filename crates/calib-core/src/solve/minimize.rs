@@ -21,7 +21,7 @@
 //! v = (g₊ − g) − H₊ δ − K δ,   K ← K + v vᵀ/(vᵀδ)                                              (2)
 //! ```
 
-use calib_geometry::decompose::{cholesky_in_place, dot, solve_in_place};
+use calib_geometry::decompose::{dot, solve_positive};
 use serde::{Deserialize, Serialize};
 
 use crate::graph::edge::EdgeKind;
@@ -400,6 +400,7 @@ fn damped_step(
     let mut with = curvature.known;
     loop {
         for i in 0..n {
+            step[i] = -system.g[i] * scale[i];
             for j in 0..i {
                 factor[i * n + j] = system.h[j * n + i] * scale[i] * scale[j];
             }
@@ -413,7 +414,7 @@ fn damped_step(
                 }
             }
         }
-        if cholesky_in_place(factor, n) {
+        if solve_positive(factor, n, step) {
             break;
         }
         if !with {
@@ -424,10 +425,6 @@ fn damped_step(
         curvature.known = false;
         curvature.s.fill(0.0);
     }
-    for i in 0..n {
-        step[i] = -system.g[i] * scale[i];
-    }
-    solve_in_place(factor, n, step);
     for i in 0..n {
         step[i] *= scale[i];
     }

@@ -6,9 +6,9 @@
 //! W = [L_1⁻ᵀ 0 −L_1⁻ᵀY_1L⁻ᵀ; 0 L_2⁻ᵀ −L_2⁻ᵀY_2L⁻ᵀ; 0 0 L⁻ᵀ],   A⁻¹ = W Wᵀ                                    (2)
 //! ```
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVectorView};
 
-use super::{cholesky_in_place, lower_inverse};
+use super::{cholesky_in_place, lower_inverse, solve_in_place};
 
 /// Matrices of fewer columns are one group: there is nothing to gain.
 const FEW: usize = 96;
@@ -26,8 +26,11 @@ pub struct InverseRoot {
 /// Root of the inverse of A, of which both triangles are given; `None` where it is not positive definite.
 #[must_use]
 pub fn inverse_root(a: &DMatrix<f64>) -> Option<InverseRoot> {
+    of_groups(a, Groups::of(a))
+}
+
+fn of_groups(a: &DMatrix<f64>, groups: Groups) -> Option<InverseRoot> {
     let n = a.nrows();
-    let groups = Groups::of(a);
     let log_det = |root: &DMatrix<f64>| root.diagonal().iter().map(|x| -2.0 * x.ln()).sum();
     if groups.own.len() == 1 {
         let root = root_of(a)?;
@@ -60,6 +63,28 @@ pub fn inverse_root(a: &DMatrix<f64>) -> Option<InverseRoot> {
         root,
         groups,
     })
+}
+
+/// y ← A⁻¹ y, of a positive definite A (n × n) whose lower triangle is given row by row and is lost; `false` where it is not positive definite.
+pub fn solve_positive(a: &mut [f64], n: usize, y: &mut [f64]) -> bool {
+    if n >= FEW {
+        let lower = |i: usize, k: usize| a[i.max(k) * n + i.min(k)];
+        let full = DMatrix::from_fn(n, n, lower);
+        let groups = Groups::of(&full);
+        if groups.own.len() > 1 {
+            let Some(InverseRoot { root, .. }) = of_groups(&full, groups) else {
+                return false;
+            };
+            let x = &root * root.tr_mul(&DVectorView::from_slice(y, n));
+            y.copy_from_slice(x.as_slice());
+            return true;
+        }
+    }
+    let positive = cholesky_in_place(a, n);
+    if positive {
+        solve_in_place(a, n, y);
+    }
+    positive
 }
 
 impl InverseRoot {
@@ -148,7 +173,11 @@ impl Groups {
             columns.sort_unstable();
             own.push(columns);
         }
-        if own.len() < 2 { one } else { Self { own, shared } }
+        if own.len() < 2 {
+            one
+        } else {
+            Self { own, shared }
+        }
     }
 }
 
@@ -172,12 +201,29 @@ mod tests {
             let of_root = &found.root * found.root.transpose();
             assert!((&of_root * &a - DMatrix::identity(n, n)).amax() < 1e-13);
             assert!((of_root - found.inverse()).amax() < 1e-16);
-            let log_det = 2.0 * a.clone().cholesky().unwrap().l().diagonal().map(f64::ln).sum();
+            let log_det = 2.0
+                * a.clone()
+                    .cholesky()
+                    .unwrap()
+                    .l()
+                    .diagonal()
+                    .map(f64::ln)
+                    .sum();
             assert!((found.log_det - log_det).abs() < 1e-10);
+            let y: Vec<f64> = (0..n).map(|i| (i as f64).cos()).collect();
+            let (mut lower, mut x) = (a.transpose().as_slice().to_vec(), y.clone());
+            for (i, row) in lower.chunks_exact_mut(n).enumerate() {
+                row[i + 1..].fill(f64::NAN);
+            }
+            assert!(solve_positive(&mut lower, n, &mut x));
+            let left = &a * DVectorView::from_slice(&x, n) - DVectorView::from_slice(&y, n);
+            assert!(left.amax() < 1e-13);
             for k in 0..n {
                 let mut indefinite = a.clone();
                 indefinite[(k, k)] = -1.0;
                 assert!(inverse_root(&indefinite).is_none());
+                let mut lower = indefinite.as_slice().to_vec();
+                assert!(!solve_positive(&mut lower, n, &mut x));
             }
         }
     }

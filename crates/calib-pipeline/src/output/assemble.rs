@@ -2,8 +2,9 @@
 
 use calib_profile::Method;
 use calib_report::{
-    DataInformation, DhTable, HeldOut, Identification, Input, MissingPhysics, NextStep, Report,
-    Residuals, Scope, Verdict, Verification, WeakDirections, Workspace, judge,
+    AccuracyLimit, DataInformation, DhTable, HeldOut, Identification, Input, MissingPhysics,
+    NextStep, Report, Residuals, RobotChange, Scope, Verdict, Verification, WeakDirections,
+    Workspace, judge,
 };
 
 use crate::formulate::formulation::MlFit;
@@ -54,7 +55,10 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         || residuals(e),
     );
     let verdict = judgment.verdict;
-    let parameters = e.fit.map_or_else(Vec::new, parameters);
+    let (parameters, (robot_changes, accuracy_limits)) = rayon::join(
+        || e.fit.map_or_else(Vec::new, parameters),
+        || of_robot(e, information.as_ref()),
+    );
     let scope = scope(e, &motions);
     let report = Report {
         profile: file.clone(),
@@ -73,10 +77,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
             .collect(),
         transforms: e.found.iter().map(transform).collect(),
         contact_points: contact_points(e, &parameters),
-        robot_changes: e
-            .fit
-            .zip(information.as_ref())
-            .map_or_else(Vec::new, |(fit, of)| robot_changes(e.inputs, fit, of)),
+        robot_changes,
         dh_table,
         changes: e.urdf.changes.clone(),
         urdf_diff: e.urdf.diff.clone(),
@@ -95,9 +96,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         recordings: recordings(e.inputs, &tracks),
         coverage: coverage(e.inputs),
         rejected: rejected(e.inputs, e.fit, e.held_out),
-        accuracy_limits: e.fit.map_or_else(Vec::new, |fit| {
-            accuracy_limits(e.inputs, e.held_out, fit, e.causes.lacks_effects())
-        }),
+        accuracy_limits,
         weak_directions: weak,
         selection: e.selection.clone(),
         workspace,
@@ -154,6 +153,19 @@ fn longest(e: &Evidence<'_>) -> Longest {
         information,
         dh_table,
     }
+}
+
+/// What changed of the robot, and how well what is said of it is known.
+fn of_robot(
+    e: &Evidence<'_>,
+    information: Option<&DataInformation>,
+) -> (Vec<RobotChange>, Vec<AccuracyLimit>) {
+    let Some(fit) = e.fit else {
+        return (Vec::new(), Vec::new());
+    };
+    let changes = information.map_or_else(Vec::new, |of| robot_changes(e.inputs, fit, of));
+    let effects = e.causes.lacks_effects();
+    (changes, accuracy_limits(e.inputs, e.held_out, fit, effects))
 }
 
 fn residuals(e: &Evidence<'_>) -> Residuals {

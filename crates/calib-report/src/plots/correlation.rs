@@ -108,7 +108,11 @@ fn root(of: &DataInformation) -> Option<DMatrix<f64>> {
     let least = OPEN * eigen.values.iter().fold(0.0_f64, |a, b| a.max(*b));
     let mut root = eigen.vectors;
     for (mut column, value) in root.column_iter_mut().zip(&eigen.values) {
-        column.scale_mut(if *value > least { value.powf(-0.5) } else { 0.0 });
+        column.scale_mut(if *value > least {
+            value.powf(-0.5)
+        } else {
+            0.0
+        });
     }
     Some(root)
 }

@@ -4,8 +4,8 @@ use nalgebra::{DMatrix, DVector};
 
 use super::columns::{Candidates, Pattern};
 use crate::analysis::solution::Solution;
-use calib_geometry::decompose::{cholesky_in_place, lower_inverse};
 use crate::solve::parted::Parted;
+use calib_geometry::decompose::{cholesky_in_place, lower_inverse};
 
 mod filled;
 mod others;

@@ -341,8 +341,11 @@ impl Solution {
         let of_chunk = |(k, chunk): (usize, &[&UntestedEffect])| {
             common.of_effects((k * CHUNK, chunk), &design, &seen, postures)
         };
-        let of_effects: Vec<Vec<Direction>> =
-            effects.par_chunks(CHUNK).enumerate().map(of_chunk).collect();
+        let of_effects: Vec<Vec<Direction>> = effects
+            .par_chunks(CHUNK)
+            .enumerate()
+            .map(of_chunk)
+            .collect();
         let mut of_effects = of_effects.into_iter().flatten();
         let mut of_changes = changes.iter().map(|changed| match changed {
             Some(changed) => changed.directions(&common, postures),

@@ -221,7 +221,10 @@ impl Design {
 fn times(root: &DMatrix<f64>, sums: &mut [Sum]) {
     let Some(first) = sums.first() else { return };
     let (n, d) = first.f.shape();
-    let concerns = |r: &usize| sums.iter().any(|sum| sum.f.row(*r).iter().any(|x| *x != 0.0));
+    let concerns = |r: &usize| {
+        sums.iter()
+            .any(|sum| sum.f.row(*r).iter().any(|x| *x != 0.0))
+    };
     let rows: Vec<usize> = (0..n).filter(concerns).collect();
     let mut all = DMatrix::zeros(rows.len(), d * sums.len());
     for (k, sum) in sums.iter().enumerate() {
