@@ -146,7 +146,7 @@ pub use analysis::change::{
 pub use analysis::closure::{ClosureStatistics, Spread};
 pub use analysis::compare::{Criterion, RankedVariant, compare, compare_with};
 pub use analysis::dependence::{Dependence, MemoryOf};
-pub use analysis::estimate::{solve, solve_from, solve_kept, solve_near};
+pub use analysis::estimate::{solve, solve_from, solve_kept, solve_near, solve_some};
 pub use analysis::folds::{folds, k_fold};
 pub use analysis::gauge::Gauge;
 pub use analysis::gear_ratio::GearRatio;

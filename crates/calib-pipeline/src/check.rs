@@ -15,7 +15,7 @@ use crate::estimate::start::{Start, start};
 use crate::formulate::bad_rows::{bad_rows, is_judged};
 use crate::formulate::by_likelihood::only_a_cross_check;
 use crate::formulate::completed::beside;
-use crate::formulate::formulation::FreeSet;
+use crate::formulate::formulation::{FreeSet, MlFit};
 use crate::formulate::{ml, model_checks};
 use crate::options::Plugins;
 use crate::output::of_data::{coverage, lost, used_for};
@@ -104,10 +104,14 @@ fn single_rows(
     let settings = Settings::default();
     let settings = settings.clone().with_robust(settings.robust.gate_alone());
     let stated = ml::state(inputs, tracks, start, FreeSet::Profile);
-    let fit = ml::fit(stated, inputs, &settings)?;
-    let bad = bad_rows(inputs, tracks, &fit);
     // An effect that is suspected may be a change.
     let suspected = findings.iter().any(|f| f.facts.get("effect").is_some());
+    let is_fine = |fit: &MlFit| bad_rows(inputs, tracks, fit).findings.is_empty();
+    if !suspected && ml::fit_some(&stated, inputs, &settings)?.is_some_and(|fit| is_fine(&fit)) {
+        return Ok(());
+    }
+    let fit = ml::fit(stated, inputs, &settings)?;
+    let bad = bad_rows(inputs, tracks, &fit);
     if bad.findings.is_empty() && !suspected {
         return Ok(());
     }

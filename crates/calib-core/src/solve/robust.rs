@@ -12,6 +12,8 @@
 //! the board (an unmodeled effect), d² is measured against their median: a model that is wrong
 //! everywhere must not declare half of its data outliers.
 
+use std::ops::Range;
+
 use calib_geometry::statistics::upper_median;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -22,8 +24,10 @@ use crate::model::cache::State;
 use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
+use crate::solve::chunks::{chunked, is_one_chunk};
 use crate::solve::equations::{Objective, Workspace};
 use crate::solve::minimize::{MinimizeSettings, Minimum, minimize_in};
+use crate::solve::rows::SampleRows;
 
 /// Why an observation does not take part.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -138,21 +142,44 @@ pub(crate) fn distances(
     mask: &[f64],
     work: &mut Workspace,
 ) -> Option<Vec<f64>> {
-    let mut out = vec![0.0; model.observations.len()];
     work.cache.update(&model.problem, values);
+    let at = State::new(&model.problem, &work.cache, values);
+    let count = model.problem.samples;
+    let mut out = vec![0.0; model.observations.len()];
+    let add = |some: Vec<(usize, f64)>| some.into_iter().for_each(|(o, d2)| out[o] = d2);
+    if is_one_chunk(count) {
+        distances_of(model, at, (theta, mask), 0..count, &mut work.rows).map(add)?;
+    } else {
+        let of = |samples: Range<usize>| {
+            let mut rows = SampleRows::new(model);
+            distances_of(model, at, (theta, mask), samples, &mut rows)
+        };
+        chunked(count, of, add)?;
+    }
+    Some(out)
+}
+
+/// Those of some samples, each with its observation.
+fn distances_of(
+    model: &Model,
+    at: State,
+    (theta, mask): (&[f64], &[f64]),
+    samples: Range<usize>,
+    rows: &mut SampleRows,
+) -> Option<Vec<(usize, f64)>> {
     let wanted = if model.slots.is_empty() {
         Derivatives::None
     } else {
         Derivatives::Random
     };
-    for sample in 0..model.problem.samples {
+    let mut out = Vec::new();
+    for sample in samples {
         if model.of_sample[sample].is_empty() {
             continue;
         }
-        let at = State::new(&model.problem, &work.cache, values);
-        work.rows.fill(model, at, mask, sample, wanted);
-        work.rows.covariance(model, mask, theta);
-        let (rows, m) = (&work.rows, work.rows.m);
+        rows.fill(model, at, mask, sample, wanted);
+        rows.covariance(model, mask, theta);
+        let m = rows.m;
         for &(o, first, count) in &rows.blocks {
             let mut l = [0.0; 36];
             let mut y = [0.0; 6];
@@ -177,7 +204,7 @@ pub(crate) fn distances(
                 }
                 y[i] /= l[i * 6 + i];
             }
-            out[o] = y[..count].iter().map(|x| x * x).sum();
+            out.push((o, y[..count].iter().map(|x| x * x).sum()));
         }
     }
     Some(out)

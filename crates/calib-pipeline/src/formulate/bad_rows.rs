@@ -70,7 +70,9 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
         .collect();
     let of_no_side = rows_of_no_side(inputs);
     let levels = row_levels(inputs, &fit.formulation.samples);
-    for name in inputs.robot.profile.bodies.keys() {
+    let bodies = inputs.robot.profile.bodies.keys();
+    let is_concerned = |name: &&String| rejected.iter().any(|(.., body)| body == *name);
+    for name in bodies.filter(is_concerned) {
         let off = BodyError {
             inputs,
             fit,

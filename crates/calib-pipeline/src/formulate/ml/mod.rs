@@ -165,6 +165,19 @@ pub fn fit(
     Ok(found(formulation, inputs, solution))
 }
 
+/// As [`fit`], from some rows of long recordings, with what is off in any; `None` where [`fit`] takes no longer.
+///
+/// # Errors
+/// As [`fit`].
+pub(crate) fn fit_some(
+    formulation: &Formulation,
+    inputs: &Inputs,
+    settings: &Settings,
+) -> Result<Option<MlFit>, PipelineError> {
+    let solution = calib_core::solve_some(&formulation.problem, settings)?;
+    Ok(solution.map(|solution| found(formulation.clone(), inputs, solution)))
+}
+
 /// As [`fit`], with noise levels to begin with, σ² per group.
 ///
 /// # Errors
