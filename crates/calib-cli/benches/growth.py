@@ -2,8 +2,9 @@
 
     python growth.py FOLDER PROGRAM [OTHER] [--only NAME,...] [--runs N]
 
-Robots, profiles and recordings (by `PROGRAM simulate`) go to FOLDER. All times are processor time, user and system, medians of N runs of which those of
-both programs take turns; the exponent is the slope of log time over log size. No test reads what this prints.
+Robots, profiles and recordings (by `PROGRAM simulate`) go to FOLDER. Times are medians of N runs of which those of both programs take turns: processor
+time, user and system, by which the exponent goes (the slope of log time over log size), and elapsed. The share of the other program is given of both. No
+test reads what this prints.
 """
 
 import argparse
@@ -13,6 +14,7 @@ import os
 import statistics
 import subprocess
 import sys
+import time
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -46,6 +48,8 @@ class Scene:
     files: int = 1
     # The robot goes from pose to pose and is recorded all the time.
     stream: bool = False
+    # Every row of a stream is taken as a pose, not only where the robot holds still.
+    every_row: bool = False
     free: list[str] = field(default_factory=lambda: ["bodies", "tracker", "joint_offsets", "joint_axes"])
 
     def urdf(self) -> str:
@@ -98,7 +102,7 @@ class Scene:
         for f in range(self.files):
             name = f"poses_{f}"
             recordings[name] = {"file": f"{name}.csv", "use": "static"}
-            if self.stream:
+            if self.stream and not self.every_row:
                 recordings[name]["timing"] = {"clock": "shared"}
             protocols[name] = {"random": random, "poses": self.poses // self.files}
         tracker = {"marker_sigma_mm": 0.1} if self.markers else {"body_sigma_mm": 0.1, "body_sigma_deg": 0.05}
@@ -153,9 +157,11 @@ def lines() -> dict[str, Line]:
 
     # A pose of a stream is some 87.5 rows.
     streams = [(rows, Scene(poses=round(rows / 87.5), stream=True)) for rows in [4_800, 48_000, 480_000]]
+    rows_of_streams = [(rows, Scene(poses=round(rows / 87.5), stream=True, every_row=True)) for rows in [4_800, 48_000]]
     humanoid = Scene(joints=6, limbs=10, poses=100)
     return {
         "stream": Line(check, streams, 1.05, 0.1),
+        "stream-rows": Line(check, rows_of_streams, 1.05, 0.1),
         "rows": Line(run, over("poses", [1_000, 10_000, 100_000]), 1.05),
         "rows-as-poses": Line(run, over("poses", [1_000, 10_000, 100_000], markers=0), 1.05),
         "check-rows": Line(check, over("poses", [1_000, 10_000, 100_000]), 1.05),
@@ -172,14 +178,16 @@ def lines() -> dict[str, Line]:
     }
 
 
-def measure(program: str, command: list[str], folder: Path) -> tuple[float, float, int]:
-    """Processor time, s, peak memory, MB, and exit code of one call."""
+def measure(program: str, command: list[str], folder: Path) -> tuple[float, float, float, int]:
+    """Processor time and elapsed time, s, peak memory, MB, and exit code of one call."""
     out = ["--out", "out"] if command[0] == "run" and "--compare-models" not in command else []
     call = [program, *command, "grown.yaml", *out]
+    began = time.monotonic()
     child = subprocess.Popen(call, cwd=folder, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     _, status, used = os.wait4(child.pid, 0)
+    elapsed = time.monotonic() - began
     child.returncode = os.waitstatus_to_exitcode(status)
-    return used.ru_utime + used.ru_stime, used.ru_maxrss / 1e3, child.returncode
+    return used.ru_utime + used.ru_stime, elapsed, used.ru_maxrss / 1e3, child.returncode
 
 
 def slope(sizes: list[int], values: list[float]) -> float:
@@ -208,12 +216,16 @@ def main() -> None:
             folder = args.folder / name.removeprefix("check-") / str(n)
             scene.write(folder, programs[0])
             all_runs = [[measure(p, line.command, folder) for p in programs] for _ in range(args.runs)]
-            shown = []
+            shown, elapsed = [], []
             for k in range(len(programs)):
                 seconds = statistics.median(r[k][0] for r in all_runs)
+                elapsed.append(statistics.median(r[k][1] for r in all_runs))
                 columns[k].append(seconds)
-                shown.append(f"{seconds:9.3f} s {max(r[k][1] for r in all_runs):8.1f} MB exit {all_runs[0][k][2]}")
-            share = f"  share {columns[0][-1] / columns[1][-1]:.3f}" if len(programs) > 1 else ""
+                memory, code = max(r[k][2] for r in all_runs), all_runs[0][k][3]
+                shown.append(f"{seconds:9.3f} s, {elapsed[k]:.3f} s elapsed {memory:8.1f} MB exit {code}")
+            share = ""
+            if len(programs) > 1:
+                share = f"  share {columns[0][-1] / columns[1][-1]:.3f}, elapsed {elapsed[0] / elapsed[1]:.3f}"
             print(f"{name:18} {n:8} {' | '.join(shown)}{share}", flush=True)
         if len(scenes) > 1:
             slopes = ", ".join(f"{slope([n for n, _ in scenes], c):.2f}" for c in columns)

@@ -18,6 +18,7 @@ use calib_geometry::so3;
 use calib_profile::Usage;
 use calib_urdf::JointId;
 use nalgebra::{Isometry3, Vector6};
+use rayon::prelude::*;
 
 use crate::formulate::formulation::MlFit;
 use crate::formulate::row_levels::row_levels;
@@ -81,11 +82,12 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
             conditions: &conditions,
         };
         // What is usual where the tracker has the same noise, else in all rows.
+        let sizes = off.sizes(&rejected);
         let usual: Vec<Option<Usual>> = levels
             .iter()
-            .map(|level| off.usual(&rejected, &|r| level.recordings.contains(r)))
+            .map(|level| usual_of(&sizes, &|r| level.recordings.contains(r)))
             .collect();
-        let of_all = off.usual(&rejected, &|_| true);
+        let of_all = usual_of(&sizes, &|_| true);
         for (recording, loaded) in inputs.recordings.iter().filter(|(_, r)| is_judged(r)) {
             let level = levels.iter().position(|l| l.recordings.contains(recording));
             let Some(usual) = level.and_then(|level| usual[level]).or(of_all) else {
@@ -223,6 +225,23 @@ struct FarOff {
 /// Usual size of rotation, rad, and position, m, errors per component.
 type Usual = (f64, f64);
 
+/// Size of the rotation and the position errors of rows, by recording.
+type Sizes<'a> = BTreeMap<&'a String, Vec<(f64, f64)>>;
+
+/// Robust size of the errors of some recordings; `None` below eight of them.
+fn usual_of(sizes: &Sizes<'_>, of: &dyn Fn(&String) -> bool) -> Option<Usual> {
+    /// Rows from which a median is worth something.
+    const ENOUGH: usize = 8;
+    let of = sizes.iter().filter(|(recording, _)| of(recording));
+    let (mut turns, mut shifts): (Vec<f64>, Vec<f64>) =
+        of.flat_map(|(_, rows)| rows).copied().unzip();
+    let middle = |all: &mut Vec<f64>| {
+        let median = upper_median(all)?;
+        (all.len() >= ENOUGH && median > 0.0).then_some(median / MEDIAN_OF_THREE)
+    };
+    Some((middle(&mut turns)?, middle(&mut shifts)?))
+}
+
 /// What one row says of a body and of the joints.
 #[derive(Clone, Copy)]
 struct SeenRow<'a> {
@@ -273,35 +292,22 @@ impl<'a> BodyError<'a> {
         })
     }
 
-    /// Robust size of the errors of the rows of some recordings that take part; `None` below eight of them, or without a body frame.
-    fn usual(
-        &self,
-        rejected: &BTreeSet<(String, usize, String)>,
-        of: &dyn Fn(&String) -> bool,
-    ) -> Option<Usual> {
-        let (mut turns, mut shifts) = (Vec::new(), Vec::new());
-        for loaded in fitted(self.inputs).filter(|loaded| of(&loaded.name)) {
-            for row in 0..loaded.q.len() {
-                let key = (loaded.name.clone(), row, self.name.to_owned());
-                if rejected.contains(&key) {
-                    continue;
-                }
-                if let Some(e) = self
-                    .seen(loaded, row)
-                    .and_then(|seen| self.at(&seen, seen.q))
-                {
-                    turns.push(e.fixed_rows::<3>(0).norm());
-                    shifts.push(e.fixed_rows::<3>(3).norm());
-                }
-            }
-        }
-        /// Rows from which a median is worth something.
-        const ENOUGH: usize = 8;
-        let middle = |all: &mut Vec<f64>| {
-            let median = upper_median(all)?;
-            (all.len() >= ENOUGH && median > 0.0).then_some(median / MEDIAN_OF_THREE)
+    /// Size of the errors of all rows that take part, rotation and position, by recording.
+    fn sizes(&self, rejected: &BTreeSet<(String, usize, String)>) -> Sizes<'a> {
+        let of_row = |loaded: &'a Loaded, row: usize| {
+            let key = (loaded.name.clone(), row, self.name.to_owned());
+            let seen = self
+                .seen(loaded, row)
+                .filter(|_| !rejected.contains(&key))?;
+            let e = self.at(&seen, seen.q)?;
+            Some((e.fixed_rows::<3>(0).norm(), e.fixed_rows::<3>(3).norm()))
         };
-        Some((middle(&mut turns)?, middle(&mut shifts)?))
+        let of_recording = |loaded: &'a Loaded| {
+            let rows = (0..loaded.q.len()).into_par_iter();
+            let sizes = rows.filter_map(|row| of_row(loaded, row)).collect();
+            (&loaded.name, sizes)
+        };
+        fitted(self.inputs).map(of_recording).collect()
     }
 
     /// Part of the squared error that a step along `direction` leaves, with the step.
