@@ -19,6 +19,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
+use statrs::distribution::{Binomial, DiscreteCDF};
 
 use crate::analysis::refit::{Start, refit};
 use crate::analysis::settings::Settings;
@@ -74,6 +75,25 @@ impl Solution {
         let parts = (&mask[..], &self.weights[..]);
         let robust = &settings.robust;
         uncontradicted(self.objective(), &self.values, parts, robust, &mut work).is_some()
+    }
+
+    /// Whether the gate rejected single observations only, and no more than it does of good ones in one fit of ten: nothing asks for an explanation.
+    #[must_use]
+    pub fn rejects_by_chance(&self, settings: &Settings) -> bool {
+        /// Chance of so many or more.
+        const USUAL: f64 = 0.1;
+        let reasons = self.rejected.iter().map(|r| r.reason);
+        let reasons: Vec<RejectReason> =
+            reasons.filter(|r| *r != RejectReason::Occlusion).collect();
+        if reasons.iter().any(|r| *r != RejectReason::Outlier) {
+            return false;
+        }
+        let rejected = reasons.len() as u64;
+        let mask = eligible(&self.model, &[]);
+        let all = mask.iter().filter(|w| **w > 0.0).count() as u64;
+        let of = Binomial::new(1.0 - settings.robust.gate, all.max(rejected));
+        // P(X ≥ k) = 1 − P(X ≤ k − 1)
+        rejected == 0 || of.is_ok_and(|of| of.sf(rejected - 1) > USUAL)
     }
 }
 

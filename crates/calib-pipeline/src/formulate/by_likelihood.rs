@@ -155,7 +155,7 @@ fn fits(
     if settings.robust.enabled {
         let mut bad = bad_rows(inputs, &checked.tracks, &fit);
         let mut complete = None;
-        if !fit.solution.rejected.is_empty() {
+        if !bad.findings.is_empty() || !fit.solution.rejects_by_chance(&alone) {
             progress("judge rows beside what the model lacks");
             let known = (&checked.tracks, &checked.findings[..]);
             if let Some(beside) = beside(inputs, known, &fit, &alone) {
