@@ -5,7 +5,7 @@ use nalgebra::{DMatrix, DVector};
 use super::columns::{Candidates, Pattern};
 use crate::analysis::solution::Solution;
 use crate::solve::parted::Parted;
-use calib_geometry::decompose::{cholesky_in_place, lower_inverse};
+use calib_geometry::decompose::{cholesky_in_place, dot, lower_inverse};
 
 mod filled;
 mod others;
@@ -298,9 +298,15 @@ impl Design {
     }
 
     fn information(&self, candidate: usize, sum: &Sum) -> DMatrix<f64> {
-        let mut information = &sum.g - sum.f.tr_mul(&sum.f);
+        let n = sum.f.nrows();
+        let column = |i: usize| &sum.f.as_slice()[i * n..(i + 1) * n];
+        let mut information = sum.g.clone();
         for i in 0..information.nrows() {
             information[(i, i)] += self.wide[candidate];
+            for k in 0..=i {
+                information[(i, k)] -= dot(column(i), column(k));
+                information[(k, i)] = information[(i, k)];
+            }
         }
         information
     }
