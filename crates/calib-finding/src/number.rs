@@ -20,6 +20,9 @@ const SCIENTIFIC_FROM: f64 = 1e7;
 /// Decimals of a value whose uncertainty is unknown: a micrometer, a millidegree, a microsecond.
 const PLAIN_DECIMALS: i32 = 3;
 
+/// Smaller numbers, in the unit that is shown, are rounding of 0: their last bits differ between machines, and no text may.
+const NOTHING: f64 = 1e-9;
+
 /// `1.234 ± 0.041 mm` from SI numbers. Without a finite σ the value stands alone.
 ///
 /// ```
@@ -153,9 +156,9 @@ pub fn percent(share: f64) -> String {
         return UNKNOWN.to_owned();
     }
     let percent = share * 100.0;
-    if percent > 99.0 && percent < 100.0 {
+    if percent > 99.0 && percent < 100.0 - NOTHING {
         "> 99 %".to_owned()
-    } else if percent > 0.0 && percent < 1.0 {
+    } else if percent > NOTHING && percent < 1.0 {
         "< 1 %".to_owned()
     } else {
         format!("{} %", fixed(percent, 0))
@@ -204,7 +207,7 @@ fn significant(value: f64, max_decimals: i32) -> String {
     if !value.is_finite() {
         return UNKNOWN.to_owned();
     }
-    let decimals = if value == 0.0 {
+    let decimals = if value.abs() < NOTHING {
         0
     } else {
         (2 - exponent(value, 3)).clamp(0, max_decimals)
@@ -222,7 +225,7 @@ fn digits_from_sigma(value: f64, sigma: f64) -> (String, String) {
     if value.abs() >= SCIENTIFIC_FROM || sigma >= SCIENTIFIC_FROM {
         return (exponential(value), exponential(sigma));
     }
-    if sigma == 0.0 {
+    if sigma < NOTHING {
         return (significant(value, PLAIN_DECIMALS), "0".to_owned());
     }
     let decimals = 1 - exponent(sigma, 2);
@@ -277,7 +280,8 @@ mod tests {
             (0.5392, 0.0123, "539 ± 12 mm"),
             (0.5392, 0.123, "540 ± 120 mm"),
             (12.3456, 1.234, "12300 ± 1200 mm"),
-            (0.1, 1e-13, "100.000000 ± <0.000001 mm"),
+            (0.1, 1e-11, "100.000000 ± <0.000001 mm"),
+            (0.1, 1e-13, "100 ± 0 mm"),
             (0.1, 0.0, "100 ± 0 mm"),
             (0.1, 3e8, "1.0e2 ± 3.0e11 mm"),
         ];
@@ -319,6 +323,7 @@ mod tests {
             (9.996e-3, "10.0 mm"),
             (12.34567, "12346 mm"),
             (0.0, "0 mm"),
+            (-1e-13, "0 mm"),
             (f64::NAN, "—"),
             (f64::INFINITY, "—"),
         ];
@@ -355,9 +360,11 @@ mod tests {
     fn shares_never_claim_all_or_nothing_by_rounding() {
         let table = [
             (0.0, "0 %"),
+            (4.4e-16, "0 %"),
             (0.004, "< 1 %"),
             (0.37, "37 %"),
             (0.9999, "> 99 %"),
+            (1.0 - 2.2e-16, "100 %"),
             (1.0, "100 %"),
             (f64::NAN, "—"),
         ];

@@ -17,7 +17,7 @@ mod profile;
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector, DVectorView};
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
@@ -273,18 +273,8 @@ impl Solution {
             .collect();
         // Second pass: each sample's share of U once the effect has been taken out, so that a strong
         // effect does not count as its own noise.
-        let share = |seen: Seen| -> (f64, Vec<f64>) {
-            let (s, alpha) = (&seen.rows, &seen.columns);
-            let left = alpha - s.a.times(&taken);
-            let moved = step.as_ref().map(|step| &s.w + s.a.times_vector(step));
-            let w = moved.as_ref().unwrap_or(&s.w);
-            let of_effect = |(k, own): (usize, DVectorView<'_, f64>)| {
-                let share = own.dot(w) - u[k] / information[k] * own.norm_squared();
-                share * share
-            };
-            let shares = left.column_iter().enumerate().map(of_effect);
-            (w.norm_squared(), shares.collect())
-        };
+        let estimates: Vec<f64> = (0..count).map(|k| u[k] / information[k]).collect();
+        let share = |seen: Seen| shares(&seen, &taken, step.as_ref(), &estimates);
         let mut clusters = vec![0.0; count];
         let mut chi2 = 0.0;
         let mut add = |(cost, shares): (f64, Vec<f64>)| {
@@ -348,6 +338,25 @@ impl Solution {
         let step = -(&c * DVector::from_row_slice(&system.g));
         Some((c, step))
     }
+}
+
+/// |w|² of a sample at the minimum, `step` away, and the square of its share of U for each effect, the effect's `estimates` taken out.
+fn shares(
+    seen: &Seen,
+    taken: &DMatrix<f64>,
+    step: Option<&DVector<f64>>,
+    estimates: &[f64],
+) -> (f64, Vec<f64>) {
+    let (s, alpha) = (&seen.rows, &seen.columns);
+    let left = alpha - s.a.times(taken);
+    let moved = step.map(|step| &s.w + s.a.times_vector(step));
+    let w = moved.as_ref().unwrap_or(&s.w);
+    let of_effects = left.column_iter().zip(estimates);
+    let shares = of_effects.map(|(own, estimate)| {
+        let share = own.dot(w) - estimate * own.norm_squared();
+        share * share
+    });
+    (w.norm_squared(), shares.collect())
 }
 
 fn candidates(model: &Model) -> Vec<Candidate> {

@@ -117,6 +117,9 @@ struct Evaluated {
 /// are accurate to about 1e-9.
 const ESTIMABLE: f64 = 1e-8;
 
+/// A variance below this share of the terms that cancel in it is their rounding.
+const CANCELLED: f64 = 1e-13;
+
 impl Solution {
     /// Pose of `to` in `from` at a configuration, with covariance.
     ///
@@ -375,7 +378,17 @@ impl Solution {
         let own = DMatrix::from_fn(columns.len(), columns.len(), |i, k| {
             covariance[(columns[i], columns[k])]
         });
-        Some(&f * own * f.transpose())
+        let mut out = &f * &own * f.transpose();
+        // What cancels but for rounding is known exactly, in the last bit of any machine.
+        let (sizes, own) = (f.abs(), own.abs());
+        for (i, row) in sizes.row_iter().enumerate() {
+            let of_terms = (&own * row.transpose()).dot(&row.transpose());
+            if out[(i, i)] <= CANCELLED * of_terms {
+                out.row_mut(i).fill(0.0);
+                out.column_mut(i).fill(0.0);
+            }
+        }
+        Some(out)
     }
 
     /// Orthonormal basis of the directions of F's image that only the prior fixes.

@@ -16,7 +16,8 @@ use std::ops::Range;
 
 use nalgebra::{DMatrix, DVector, Vector3};
 
-use super::{Common, Direction, MovedPoint, add_motion};
+use super::displacement::add_motion;
+use super::{Common, Direction, MovedPoint};
 use crate::analysis::change::columns::{Candidates, Pattern};
 use crate::analysis::change::contest::holds;
 use crate::analysis::change::{Change, Moved};

@@ -18,11 +18,12 @@
 //! what is not in the model and was taken for noise of the joints is in it.
 
 mod changed;
+mod displacement;
 mod sums;
 
 use std::collections::BTreeMap;
 
-use nalgebra::{DMatrix, DVector, DVectorViewMut, Matrix3, Vector3};
+use nalgebra::{DMatrix, DVector, Matrix3, Vector3};
 use rayon::prelude::*;
 
 use crate::analysis::change::Change;
@@ -34,6 +35,7 @@ use crate::model::path::Step;
 use crate::solve::equations::Objective;
 use crate::solve::whitened::covariance_of;
 use changed::Changed;
+use displacement::{Displacement, add_motion};
 use sums::{Columns, Design, Seen};
 
 /// Effects whose products are taken by one task.
@@ -165,33 +167,6 @@ struct Common {
     joints: (f64, f64),
 }
 
-/// A displacement of all u_m/√M.
-#[derive(Clone)]
-struct Displacement {
-    d: DVector<f64>,
-    /// K d.
-    open: DVector<f64>,
-}
-
-impl Displacement {
-    fn scaled(&self, factor: f64) -> Self {
-        Self {
-            d: &self.d * factor,
-            open: &self.open * factor,
-        }
-    }
-
-    fn add(&mut self, factor: f64, other: &Self) {
-        self.d.axpy(factor, &other.d, 1.0);
-        self.open.axpy(factor, &other.open, 1.0);
-    }
-
-    /// dᵀK d
-    fn along(&self) -> f64 {
-        self.d.dot(&self.open)
-    }
-}
-
 /// One direction of a cause.
 struct Direction {
     /// What it does, per unit.
@@ -287,15 +262,6 @@ impl Common {
             rms: mean.max(0.0).sqrt(),
             upper: self.upper(mean, variance),
         }
-    }
-}
-
-/// Adds d_m/√M to what is displaced over all postures.
-fn add_motion(to: &mut DVectorViewMut<'_, f64>, at: impl Iterator<Item = Vector3<f64>>) {
-    let root = (to.len() as f64 / 3.0).sqrt();
-    for (m, moved) in at.enumerate() {
-        let mut place = to.rows_mut(3 * m, 3);
-        place += moved / root;
     }
 }
 
