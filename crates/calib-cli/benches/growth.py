@@ -80,8 +80,8 @@ class Scene:
                     parent = f"l{limb}_{k}_{f}"
         return "\n".join([*out, "</robot>"])
 
-    def profile(self) -> dict[str, object]:
-        """The profile, with what `simulate` needs."""
+    def profile(self, timing: bool) -> dict[str, object]:
+        """The profile, with what `simulate` needs; with the clock of a stream."""
         bodies: dict[str, object] = {}
         mounts: dict[str, object] = {}
         for limb in range(self.limbs):
@@ -102,7 +102,7 @@ class Scene:
         for f in range(self.files):
             name = f"poses_{f}"
             recordings[name] = {"file": f"{name}.csv", "use": "static"}
-            if self.stream and not self.every_row:
+            if timing:
                 recordings[name]["timing"] = {"clock": "shared"}
             protocols[name] = {"random": random, "poses": self.poses // self.files}
         tracker = {"marker_sigma_mm": 0.1} if self.markers else {"body_sigma_mm": 0.1, "body_sigma_deg": 0.05}
@@ -125,14 +125,15 @@ class Scene:
 
     def write(self, folder: Path, program: str) -> None:
         """Robot, profile and recordings, where they are not there yet."""
-        text = json.dumps(self.profile(), indent=1)
+        text = json.dumps(self.profile(timing=self.stream and not self.every_row), indent=1)
         if (folder / "done").exists() and (folder / "grown.yaml").read_text() == text:
             return
         folder.mkdir(parents=True, exist_ok=True)
         (folder / "grown.urdf").write_text(self.urdf())
-        (folder / "grown.yaml").write_text(text)
+        (folder / "grown.yaml").write_text(json.dumps(self.profile(timing=self.stream), indent=1))
         call = [program, "simulate", "grown.yaml", "--out", ".", "--quiet"]
         subprocess.run(call, cwd=folder, check=True)
+        (folder / "grown.yaml").write_text(text)
         (folder / "done").touch()
 
 

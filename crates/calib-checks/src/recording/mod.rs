@@ -16,6 +16,7 @@ pub use shapes::other_shapes;
 use crate::rigid_body::Template;
 use calib_finding::Finding;
 use calib_recording::Poses;
+use rayon::prelude::*;
 use std::collections::BTreeMap;
 
 /// What is known about a recording beforehand. Everything may be left out; what is not given is not checked.
@@ -39,23 +40,30 @@ pub struct Expectations {
 
 /// All checks that need no model, in a fixed order.
 pub fn checks(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
-    let mut findings = Vec::new();
-    findings.extend(joints::too_few(poses, expected));
-    findings.extend(joints::units(poses, expected));
-    findings.extend(joints::limits(poses, expected));
-    findings.extend(joints::coverage(poses, expected));
-    findings.extend(joints::duplicates(poses));
-    findings.extend(markers::zeros(poses));
-    findings.extend(markers::length_unit(poses, expected));
-    findings.extend(markers::duplicates(poses));
-    findings.extend(markers::frozen(poses, expected));
-    findings.extend(markers::virtual_points(poses));
-    findings.extend(rigidity::rigidity(poses, expected));
-    findings.extend(rows::repeated(poses));
-    findings.extend(motion::rotations(poses));
-    findings.extend(motion::flips(poses));
-    findings.extend(motion::jumps(poses));
-    findings.extend(motion::gaps(poses));
-    findings.extend(motion::unsettled(poses, expected));
-    findings
+    // Side by side; the findings are in this order.
+    let all: [&(dyn Fn() -> Vec<Finding> + Sync); 17] = [
+        &|| listed(joints::too_few(poses, expected)),
+        &|| listed(joints::units(poses, expected)),
+        &|| listed(joints::limits(poses, expected)),
+        &|| listed(joints::coverage(poses, expected)),
+        &|| listed(joints::duplicates(poses)),
+        &|| listed(markers::zeros(poses)),
+        &|| listed(markers::length_unit(poses, expected)),
+        &|| listed(markers::duplicates(poses)),
+        &|| listed(markers::frozen(poses, expected)),
+        &|| listed(markers::virtual_points(poses)),
+        &|| listed(rigidity::rigidity(poses, expected)),
+        &|| listed(rows::repeated(poses)),
+        &|| listed(motion::rotations(poses)),
+        &|| listed(motion::flips(poses)),
+        &|| listed(motion::jumps(poses)),
+        &|| listed(motion::gaps(poses)),
+        &|| listed(motion::unsettled(poses, expected)),
+    ];
+    let found: Vec<Vec<Finding>> = all.par_iter().map(|check| check()).collect();
+    found.concat()
+}
+
+fn listed(found: impl IntoIterator<Item = Finding>) -> Vec<Finding> {
+    found.into_iter().collect()
 }
