@@ -1,7 +1,9 @@
 //! Recordings of many samples: a fit begins with some of them and tests look at some of them, and nothing that matters is lost by it.
 
 use crate::common::{Chain, Free, Handles, normal, normal3, rng, six_r};
-use calib_core::{ChangeSettings, MarkerObservation, Moved, NoiseKind, Settings, Solution, solve};
+use calib_core::{
+    ChangeSettings, MarkerObservation, Moved, NoiseKind, Settings, Solution, solve, solve_some,
+};
 use nalgebra::{Point3, Translation3, Vector3};
 use rand::RngExt;
 
@@ -138,6 +140,30 @@ fn a_fit_that_begins_with_some_samples_ends_where_all_of_them_say() {
         // The short recording is like any other.
         let of_short = rejected.iter().filter(|o| **o < 4 * SHORT).count();
         assert!(of_short < 10, "{of_short} of the short recording");
+    }
+}
+
+#[test]
+fn a_fit_of_some_samples_rejects_all_that_the_fit_of_all_rejects() {
+    for joint_noise in [false, true] {
+        let has = Has {
+            outliers: 0.01,
+            joint_noise,
+            ..Has::default()
+        };
+        let case = case(6, has);
+        let settings = Settings::default();
+        let some = solve_some(&case.h.problem, &settings).expect("solves");
+        let (some, all) = (some.expect("a long recording"), fit(&case));
+        assert!(some.status.is_converged());
+        let places = |of: &Solution| -> Vec<(usize, usize)> {
+            of.rejected.iter().map(|r| (r.sample, r.item)).collect()
+        };
+        let (some, all) = (places(&some), places(&all));
+        assert!(all.iter().all(|place| some.contains(place)));
+        // Five good observations of a thousand in place of one.
+        let more = some.len() - all.len();
+        assert!((20..160).contains(&more), "{more} of {}", 4 * SAMPLES);
     }
 }
 
