@@ -1,5 +1,6 @@
 //! Sums of rows with joint noise: rows of one instant err together where a joint does.
 
+use calib_geometry::decompose::inverse_root;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::chain::{Chain, Motion};
@@ -119,10 +120,10 @@ impl Whitened {
         let n = block.nrows();
         let mut v = DMatrix::identity(n, n);
         v.gemm(self.lambda, &noise.d, &noise.d.transpose(), 1.0);
-        match (self.lambda > 0.0).then(|| inverse_root(v)).flatten() {
-            Some((root, log_det)) => {
-                self.log_det += log_det;
-                self.added.push(&(root * block));
+        match (self.lambda > 0.0).then(|| inverse_root(&v)).flatten() {
+            Some(of) => {
+                self.log_det += of.log_det;
+                self.added.push(&(of.root.transpose() * block));
             }
             None => self.added.push(block),
         }
@@ -136,23 +137,12 @@ impl Whitened {
         let joints = noise.gram.nrows();
         let mut m = noise.gram.clone();
         (0..joints).for_each(|k| m[(k, k)] += 1.0 / self.lambda);
-        if let Some((root, log_det)) = inverse_root(m) {
-            self.log_det += log_det + joints as f64 * self.lambda.ln();
-            self.subtracted.push(&(root * &noise.of_block));
+        if let Some(of) = inverse_root(&m) {
+            self.log_det += of.log_det + joints as f64 * self.lambda.ln();
+            self.subtracted
+                .push(&(of.root.transpose() * &noise.of_block));
         }
     }
-}
-
-/// The inverse of the lower triangular root of a matrix, and the logarithm of its determinant.
-fn inverse_root(of: DMatrix<f64>) -> Option<(DMatrix<f64>, f64)> {
-    let n = of.nrows();
-    let cholesky = Cholesky::new(of)?;
-    let l = cholesky.l_dirty();
-    let log_det = 2.0 * l.diagonal().iter().map(|x| x.ln()).sum::<f64>();
-    let mut inverse = DMatrix::identity(n, n);
-    l.solve_lower_triangular_mut(&mut inverse);
-    // A product has a fast kernel, the solution of a triangular system has none.
-    Some((inverse, log_det))
 }
 
 /// Rows that wait to be multiplied: one product of many rows is several times as fast as many of few.
