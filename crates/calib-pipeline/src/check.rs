@@ -106,7 +106,10 @@ fn single_rows(
     let stated = ml::state(inputs, tracks, start, FreeSet::Profile);
     // An effect that is suspected may be a change.
     let suspected = findings.iter().any(|f| f.facts.get("effect").is_some());
-    let is_fine = |fit: &MlFit| bad_rows(inputs, tracks, fit).findings.is_empty();
+    let is_fine = |fit: &MlFit| {
+        let converged = fit.solution.status.is_converged();
+        converged && bad_rows(inputs, tracks, fit).findings.is_empty()
+    };
     if !suspected && ml::fit_some(&stated, inputs, &settings)?.is_some_and(|fit| is_fine(&fit)) {
         return Ok(());
     }

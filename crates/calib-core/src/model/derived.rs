@@ -117,8 +117,8 @@ struct Evaluated {
 /// are accurate to about 1e-9.
 const ESTIMABLE: f64 = 1e-8;
 
-/// A variance below this share of the terms that cancel in it is their rounding.
-const CANCELLED: f64 = 1e-13;
+/// A variance below this share of the terms that cancel in it is their rounding: of terms of 1 m², 60 nm.
+const CANCELLED: f64 = 16.0 * f64::EPSILON;
 
 impl Solution {
     /// Pose of `to` in `from` at a configuration, with covariance.
