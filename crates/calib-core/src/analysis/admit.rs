@@ -77,7 +77,8 @@ impl Solution {
         uncontradicted(self.objective(), &self.values, parts, robust, &mut work).is_some()
     }
 
-    /// Whether the gate rejected single observations only, and no more than it does of good ones in one fit of ten: nothing asks for an explanation.
+    /// Whether the gate rejected single observations only, and so many or more of good ones are rejected in more than one fit of ten: there is nothing
+    /// to explain.
     #[must_use]
     pub fn rejects_by_chance(&self, settings: &Settings) -> bool {
         /// Chance of so many or more.

@@ -108,8 +108,8 @@ pub fn solve_near(
     finish(model, found.minimum, outcome)
 }
 
-/// As [`solve`], from the samples only that the fit of a long recording begins with: what is off in any sample shows as well, at a tenth of the price. The
-/// gate judges all, and a little more severely: nothing passes that it would reject at the minimum of all. `None` where [`solve`] takes no longer.
+/// As [`solve`], from the samples only that the fit of a long recording begins with, at a tenth of the time. The gate judges all samples, and more
+/// severely: the minimum of some differs a little from that of all. `None` where [`solve`] takes no longer.
 ///
 /// # Errors
 /// As [`solve`].

@@ -12,6 +12,7 @@
 use std::collections::BTreeSet;
 use std::ops::Range;
 
+use calib_geometry::decompose::{cholesky_in_place, lower_inverse, solve_in_place};
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
@@ -25,7 +26,6 @@ use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::normal::accumulate;
 use crate::solve::rows::add_block;
 use crate::solve::whitened::{Whitened, covariance_of, whitened};
-use calib_geometry::decompose::{cholesky_in_place, lower_inverse, solve_in_place};
 
 /// Prediction of one sample from the others.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -1,11 +1,11 @@
 //! Cumulative sums of equation (1) over the samples, and the best set of samples of a candidate.
 
+use calib_geometry::decompose::{dot, inverse_root};
 use nalgebra::{DMatrix, DVector};
 
 use super::columns::{Candidates, Pattern};
 use crate::analysis::solution::Solution;
 use crate::solve::parted::Parted;
-use calib_geometry::decompose::{cholesky_in_place, dot, lower_inverse};
 
 mod filled;
 mod others;
@@ -287,14 +287,7 @@ impl Design {
     /// I of equation (1), inverted; `None` where it is not positive.
     fn inverse(&self, candidate: usize, after: &After) -> Option<DMatrix<f64>> {
         let information = self.information(candidate, &self.sum(candidate, after));
-        let n = information.nrows();
-        let mut l = information.as_slice().to_vec();
-        if !cholesky_in_place(&mut l, n) {
-            return None;
-        }
-        // Row after row of L⁻¹ is column after column of its transpose.
-        let transposed = DMatrix::from_vec(n, n, lower_inverse(&l, n));
-        Some(&transposed * transposed.transpose())
+        Some(inverse_root(&information)?.inverse())
     }
 
     fn information(&self, candidate: usize, sum: &Sum) -> DMatrix<f64> {

@@ -5,9 +5,8 @@
 //! (Δ − FᵀF)⁻¹ = Δ⁻¹ + WᵀM⁻¹W,   W = F Δ⁻¹,   M = 1 − F Δ⁻¹ Fᵀ,   |Δ − FᵀF| = |Δ| |M|                 (2)
 //! ```
 
-use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
-
 use calib_geometry::decompose::{cholesky_in_place, solve_in_place};
+use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 /// What draws are seen with: the diagonal Σ G̃ᵀG̃, and F, unknowns × draws.
 pub(super) struct Draws {
