@@ -154,7 +154,17 @@ fn changed(report: &Report) -> Option<Diagnosis> {
     })
 }
 
-/// Findings that name a cause of errors, the most likely first.
+/// Findings that say what made the errors.
+pub(crate) const NAMED_CAUSES: [Id; 6] = [
+    catalog::CHANGED_WHILE_RECORDING,
+    catalog::MISSING_PHYSICS,
+    CAUSES[0],
+    CAUSES[1],
+    CAUSES[2],
+    CAUSES[3],
+];
+
+/// Findings that name a cause of errors without a test of the fit, the most likely first.
 const CAUSES: [Id; 4] = [
     catalog::CLOCK_LAG,
     catalog::JOINT_GAIN,

@@ -26,7 +26,7 @@ use rayon::prelude::*;
 use crate::analysis::solution::{Solution, describe_parameters};
 use crate::graph::measurement::MeasurementKind;
 use crate::solve::equations::Workspace;
-use crate::solve::whitened::{covariance_of, whitened};
+use crate::solve::whitened::{Whitened, covariance_of, whitened};
 
 mod scaled;
 
@@ -63,6 +63,12 @@ pub struct Dependence {
 }
 
 impl Dependence {
+    /// Variance of a sum over many samples, over what it is without memory.
+    #[must_use]
+    pub fn of_sums(&self) -> f64 {
+        self.level * (1.0 + 2.0 * self.share * self.decay / (1.0 - self.decay))
+    }
+
     /// Whether noise without memory shows so much less often than once in a thousand fits.
     #[must_use]
     pub fn is_significant(&self) -> bool {
@@ -76,6 +82,9 @@ impl Dependence {
         }
     }
 }
+
+/// Changes the whitened residuals of a sample.
+pub(crate) type BesideRows<'a> = dyn Fn(usize, &mut Whitened, &Workspace) + Sync + 'a;
 
 /// Samples that the memory is estimated from at most.
 const SAMPLES: usize = 1500;
@@ -94,7 +103,16 @@ impl Solution {
     /// remembered. Where the residuals do not show one, decay and share are zero, and correlation and z may be bounds that are too large. `None` where fewer than eight samples or no pairs of rows exist.
     #[must_use]
     pub fn dependence(&self, borders: &[usize]) -> Option<Dependence> {
-        let all = self.dependence_of(MemoryOf::All, borders)?;
+        self.dependence_beside(borders, &|_, _, _| {})
+    }
+
+    /// The same where the residuals of a sample are first changed: what they are beside something that the model does not have.
+    pub(crate) fn dependence_beside(
+        &self,
+        borders: &[usize],
+        beside: &BesideRows,
+    ) -> Option<Dependence> {
+        let all = self.dependence_of(MemoryOf::All, borders, beside)?;
         let mut measurements = self.model.problem.measurements.iter();
         let poses = measurements.any(|m| matches!(m.kind, MeasurementKind::Poses(_)));
         if !poses {
@@ -105,16 +123,21 @@ impl Solution {
         let parts = [MemoryOf::Positions, MemoryOf::Orientations];
         let parts = parts
             .into_iter()
-            .filter_map(|of| self.dependence_of(of, borders));
+            .filter_map(|of| self.dependence_of(of, borders, beside));
         let found = parts.chain([all]).filter(Dependence::is_significant);
         let clearest = found.max_by(|a, b| a.z.total_cmp(&b.z));
         Some(clearest.unwrap_or(all))
     }
 
-    fn dependence_of(&self, of: MemoryOf, borders: &[usize]) -> Option<Dependence> {
+    fn dependence_of(
+        &self,
+        of: MemoryOf,
+        borders: &[usize],
+        beside: &BesideRows,
+    ) -> Option<Dependence> {
         /// Fewer pairs say nothing.
         const LEAST: usize = 8;
-        let samples = self.scaled_samples(of, borders, SAMPLES);
+        let samples = self.scaled_samples(of, borders, SAMPLES, beside);
         if samples.len() < LEAST {
             return None;
         }
@@ -184,7 +207,7 @@ impl Solution {
         let n = self.model.free();
         let mut memory = Memory::new(dependence.share, dependence.decay, n);
         let mut added = DMatrix::zeros(n, n);
-        self.each_scaled(dependence.of, borders, |sample| {
+        self.each_scaled(dependence.of, borders, &|_, _, _| {}, |sample| {
             added.gemm_tr(1.0, &memory.of(&sample), &sample.k, 1.0);
             true
         });
@@ -204,9 +227,15 @@ impl Solution {
     }
 
     /// The first samples, at most so many.
-    fn scaled_samples(&self, of: MemoryOf, borders: &[usize], most: usize) -> Vec<Scaled> {
+    fn scaled_samples(
+        &self,
+        of: MemoryOf,
+        borders: &[usize],
+        most: usize,
+        beside: &BesideRows,
+    ) -> Vec<Scaled> {
         let mut out = Vec::new();
-        self.each_scaled(of, borders, |sample| {
+        self.each_scaled(of, borders, beside, |sample| {
             out.push(sample);
             out.len() < most
         });
@@ -214,13 +243,20 @@ impl Solution {
     }
 
     /// Calls `see` with one sample after the other until it gives `false`.
-    fn each_scaled(&self, of: MemoryOf, borders: &[usize], mut see: impl FnMut(Scaled) -> bool) {
+    fn each_scaled(
+        &self,
+        of: MemoryOf,
+        borders: &[usize],
+        beside: &BesideRows,
+        mut see: impl FnMut(Scaled) -> bool,
+    ) {
         let mut work = Workspace::new(&self.model);
         work.cache.update(&self.model.problem, &self.values);
         let of_some = |some: &[usize]| -> Vec<(usize, Unnumbered)> {
             let mut work = work.clone();
             let rows = some.iter().filter_map(|&sample| {
-                let rows = whitened(self.objective(), &self.values, sample, &mut work)?;
+                let mut rows = whitened(self.objective(), &self.values, sample, &mut work)?;
+                beside(sample, &mut rows, &work);
                 Some((sample, scaled_sample(self, &rows, of)))
             });
             rows.collect()

@@ -4,15 +4,16 @@
 //!
 //! ```text
 //! U = Σ_s aᵀ V⁻¹ e,   I = Σ_s aᵀV⁻¹a − bᵀ C b,   b = Σ_s JᵀV⁻¹a                             (1)
-//! ĉ = −U / I,   z² = U² / max(I, Σ_s u_s²)  ~  χ²(1) if c = 0 (Rao's score test)            (2)
+//! ĉ = −U / I,   z² = U² / max(I, m Σ_s u_s²)  ~  χ²(1) if c = 0 (Rao's score test)          (2)
 //! ```
 //!
 //! No refit is needed. `Σ u_s²` (u_s the sample's own share of U once parameters and effect are fitted) is the
-//! variance that samples as clusters show: correlated residuals inside a sample cannot fake significance. If the
-//! stated noise is too small, z² is divided by χ²/dof.
+//! variance that samples as clusters show: correlated residuals inside a sample cannot fake significance. Nor can
+//! those of successive samples: m is how much more their sums scatter (`successive`). If the stated noise is too small, z² is divided by χ²/dof.
 
 mod columns;
 mod directions;
+mod memory;
 mod profile;
 
 use std::collections::BTreeMap;
@@ -25,6 +26,7 @@ use statrs::distribution::{ChiSquared, ContinuousCDF};
 use crate::analysis::looked_at::LookedAt;
 use crate::analysis::score::Scored;
 use crate::analysis::solution::Solution;
+use crate::analysis::successive::clustered;
 use crate::graph::edge::EdgeKind;
 use crate::graph::effect::{Drives, EFFECTS, EffectKind, Source};
 use crate::graph::ids::EdgeId;
@@ -72,6 +74,12 @@ impl ScoreTest {
     #[must_use]
     pub fn is_significant(&self) -> bool {
         self.p_corrected < GoodnessOfFit::SIGNIFICANT
+    }
+
+    /// Whether the model lacks the effect: significant, relevant and possible.
+    fn is_missing(&self) -> bool {
+        let counts = self.is_significant() && self.explains > GoodnessOfFit::RELEVANT;
+        counts && self.is_possible()
     }
 
     /// Physics allows a coefficient of this sign.
@@ -181,19 +189,14 @@ impl Solution {
         let mut tests = self.score_tests(&candidates, &self.looked_at())?;
         self.with_profiles(&candidates, &mut tests);
         tests.sort_by(|a, b| b.z2.total_cmp(&a.z2).then_with(|| a.name.cmp(&b.name)));
+        self.with_memory(&candidates, &mut tests);
         let chi2_per_dof = self.chi2_stated / self.degrees_of_freedom.max(1.0);
         let all_estimated = self.noise.iter().all(|n| n.estimated);
         let p_value = (!all_estimated && self.degrees_of_freedom >= 1.0)
             .then(|| ChiSquared::new(self.degrees_of_freedom).ok())
             .flatten()
             .map(|d| d.sf(self.chi2_stated));
-        let missing = tests
-            .iter()
-            .filter(|t| {
-                t.is_significant() && t.explains > GoodnessOfFit::RELEVANT && t.is_possible()
-            })
-            .cloned()
-            .collect();
+        let missing = tests.iter().filter(|t| t.is_missing()).cloned().collect();
         Some(GoodnessOfFit {
             chi2_per_dof,
             p_value,
@@ -275,12 +278,11 @@ impl Solution {
         // effect does not count as its own noise.
         let estimates: Vec<f64> = (0..count).map(|k| u[k] / information[k]).collect();
         let share = |seen: Seen| shares(&seen, &taken, step.as_ref(), &estimates);
-        let mut clusters = vec![0.0; count];
+        let mut of_samples: Vec<Vec<f64>> = Vec::with_capacity(samples.len());
         let mut chi2 = 0.0;
         let mut add = |(cost, shares): (f64, Vec<f64>)| {
             chi2 += cost;
-            let sums = clusters.iter_mut().zip(shares);
-            sums.for_each(|(sum, share)| *sum += share);
+            of_samples.push(shares);
         };
         if keep {
             let all: Vec<(f64, Vec<f64>)> = kept.into_par_iter().map(share).collect();
@@ -295,11 +297,13 @@ impl Solution {
         let mut out = Vec::new();
         for (k, candidate) in candidates.iter().enumerate() {
             let one = |value: f64| DMatrix::from_element(1, 1, value);
+            let shares = of_samples.iter().map(|s| DVector::from_element(1, s[k]));
+            let clusters = clustered(&shares.collect::<Vec<_>>(), 1);
             let scored = Scored {
                 u: &DVector::from_element(1, u[k]),
                 information: &one(information[k]),
                 raw: &raw[k..=k],
-                clusters: Some(&one(clusters[k])),
+                clusters: Some(&clusters),
                 excess,
                 samples: if looked_at.all {
                     model.problem.samples
@@ -340,7 +344,7 @@ impl Solution {
     }
 }
 
-/// |w|² of a sample at the minimum, `step` away, and the square of its share of U for each effect, the effect's `estimates` taken out.
+/// |w|² of a sample at the minimum, `step` away, and its share of U for each effect, the effect's `estimates` taken out.
 fn shares(
     seen: &Seen,
     taken: &DMatrix<f64>,
@@ -352,10 +356,7 @@ fn shares(
     let moved = step.map(|step| &s.w + s.a.times_vector(step));
     let w = moved.as_ref().unwrap_or(&s.w);
     let of_effects = left.column_iter().zip(estimates);
-    let shares = of_effects.map(|(own, estimate)| {
-        let share = own.dot(w) - estimate * own.norm_squared();
-        share * share
-    });
+    let shares = of_effects.map(|(own, estimate)| own.dot(w) - estimate * own.norm_squared());
     (w.norm_squared(), shares.collect())
 }
 

@@ -30,6 +30,7 @@ pub(crate) mod solution;
 pub(crate) mod spread;
 pub(crate) mod standardized;
 pub(crate) mod starts;
+pub(crate) mod successive;
 pub(crate) mod tails;
 pub(crate) mod untested;
 pub(crate) mod validate;

@@ -1,11 +1,12 @@
 //! Rao's score test of columns that a fit does not have.
 //!
 //! ```text
-//! U = Σ_s aᵀV⁻¹e,   I = Σ_s aᵀV⁻¹a − bᵀCb,   K = Σ_s u_s u_sᵀ                              (1)
+//! U = Σ_s aᵀV⁻¹e,   I = Σ_s aᵀV⁻¹a − bᵀCb,   K = m Σ_s u_s u_sᵀ                            (1)
 //! z² = min( UᵀI⁺U / f,  UᵀK⁺U (n − r + 1)/n )  ~  χ²(r),   r = rank I                       (2)
 //! ```
 //!
-//! u_s is a sample's own share of U once parameters and columns are fitted, f the excess of χ²/dof over 1, n the number of
+//! u_s is a sample's own share of U once parameters and columns are fitted, m how much more sums of successive samples scatter
+//! ([`successive`](super::successive)), f the excess of χ²/dof over 1, n the number of
 //! samples: K rests on n shares, and the factor is what r directions take of them (Hotelling).
 
 use calib_geometry::decompose::symmetric_eigen;

@@ -15,6 +15,7 @@ mod justin;
 mod laws;
 mod limits;
 mod long;
+mod memory;
 mod noise;
 mod own_levels;
 mod posture;

@@ -4,7 +4,7 @@ super::topic! {
     /// Successive rows of one posture.
     FRAMES_MERGED = "frames-merged" {
         "": Info,
-            "The {rows:row} show {poses:pose}: successive rows with equal joint values were merged into their mean, which counts once.[[ {copies:row} repeat the row before in every tracked value.]]",
+            "The {rows:row} show {poses:pose}: successive rows in which the joints rest, within 0.011° or 0.2 mm, were merged into their mean, which counts once.[[ {copies:row} repeat the row before in every tracked value.]]",
             "Nothing is needed. Record more poses rather than more frames of a pose: the frames share the error of the posture.";
     }
     /// Residuals of successive rows are correlated.

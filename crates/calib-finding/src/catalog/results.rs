@@ -97,7 +97,7 @@ super::topic! {
     /// What is random from pose to pose is no noise of a joint.
     NOISE_IS_PHYSICS = "noise-is-physics" {
         "swallowed": Info,
-            "Joint noise of {sigma} maximizes the likelihood, but predicts left-out poses worse ({poses:pose} left out in turn): physics is missing from the model. The fit uses weights that do not depend on the robot model.",
+            "Joint noise of {sigma} maximizes the likelihood, but predicts left-out poses worse ({poses:pose} left out in turn): physics is missing from the model, or successive rows share the errors of the joints. The fit uses weights that do not depend on the robot model.",
             "If `missing-physics` names effects, enable them and compare the held-out errors; otherwise record more poses.";
         "no_encoder": Info,
             "Joint positions deviate from their readings by {sigma} (σ), differently in each pose. No encoder has that noise: physics is missing from the model (backlash, compliance, eccentricity), or the readings belong to other poses.",

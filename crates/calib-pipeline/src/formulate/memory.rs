@@ -4,6 +4,9 @@ use calib_finding::{About, Fact, Finding, catalog};
 
 use crate::formulate::formulation::MlFit;
 
+/// The strongest correlation that is stated.
+const LARGEST: f64 = 0.99;
+
 /// Gives the fit the uncertainty that it has under the memory that its residuals show, with the finding that says so.
 pub(crate) fn with_memory(fit: &mut MlFit) -> Option<Finding> {
     let borders = fit.formulation.borders();
@@ -26,7 +29,8 @@ pub(crate) fn with_memory(fit: &mut MlFit) -> Option<Finding> {
     fit.solution = under;
     Some(
         Finding::new(catalog::NOISE_HAS_MEMORY, About::Fit)
-            .with("correlation", Fact::ratio(found.lag_one))
+            // An estimate, which may exceed what a correlation can be.
+            .with("correlation", Fact::ratio(found.lag_one.min(LARGEST)))
             .with("factor", Fact::number(factor, calib_finding::Unit::One)),
     )
 }

@@ -65,6 +65,8 @@ fn own_levels(fit: &mut MlFit, inputs: &Inputs, settings: &Settings) -> bool {
 
 /// Markers that have a noise level of their own.
 pub(crate) fn of_markers(fit: &MlFit) -> Vec<Finding> {
+    /// Levels that differ by less than this, as logarithms, are the same.
+    const ALIKE: f64 = 0.1;
     let mut findings = Vec::new();
     let sigma = |group: GroupId| fit.solution.noise[group.index()].sigma;
     for measurement in fit.formulation.problem.measurements() {
@@ -79,11 +81,16 @@ pub(crate) fn of_markers(fit: &MlFit) -> Vec<Finding> {
             let Some((body, marker)) = fit.formulation.points.iter().find_map(of) else {
                 continue;
             };
+            let (own, others) = (sigma(*level), sigma(markers.noise));
+            // The final levels may be alike although those of the choice were not.
+            if (own / others).ln().abs() < ALIKE {
+                continue;
+            }
             let finding = Finding::new(catalog::MARKER_NOISE, About::Fit)
                 .with("marker", Fact::name(marker))
                 .with("body", Fact::name(body))
-                .with("sigma", Fact::meters(sigma(*level)))
-                .with("others", Fact::meters(sigma(markers.noise)));
+                .with("sigma", Fact::meters(own))
+                .with("others", Fact::meters(others));
             findings.push(finding);
         }
     }

@@ -1,8 +1,9 @@
-//! Frames of one pose: successive rows with equal joint values become one row, the mean of what was tracked.
+//! Frames of one pose: successive rows whose joint values stay within the jitter of encoders at rest become one row, the mean of joint values
+//! and of what was tracked.
 //!
 //! Ten frames of a pose share the error of the robot's posture. As ten rows they would count it as ten independent
 //! ones, and every σ would come out too small. Copies of a row are a special case: they agree in everything. Rows that
-//! return to a posture later are new measurements and stay.
+//! return to a posture later are new measurements and stay. Of a slow motion neighbors are merged: their mean is as good a pose.
 
 use std::ops::Range;
 
@@ -13,8 +14,8 @@ use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::prepare::inputs::{Inputs, Loaded};
 
-/// Joint values that agree to this are one posture: below the resolution of any encoder, rad or m.
-const EQUAL: f64 = 1e-7;
+/// Joint values of a robot at rest stay within this, rad or m: two steps of an encoder of 16 bits, 0.011°.
+const JITTER: f64 = 2e-4;
 /// Frames of a robot at rest agree to this, m. Where they do not, the joint values are not those of the rows.
 const AT_REST: f64 = 5e-3;
 /// Measured twice, a place differs by more than this, m: what is closer was copied and rounded.
@@ -60,19 +61,31 @@ pub fn merge(inputs: &mut Inputs) -> Vec<Finding> {
     findings
 }
 
-/// Successive rows with equal joint values, where the bodies stood still meanwhile.
+/// Successive rows in which every joint stays within the jitter, where the bodies stood still meanwhile.
 fn postures(loaded: &Loaded) -> Vec<Range<usize>> {
-    let equal = |a: usize, b: usize| match (&loaded.q[a], &loaded.q[b]) {
-        (Some(a), Some(b)) => a.iter().zip(b).all(|(a, b)| (a - b).abs() <= EQUAL),
-        _ => false,
-    };
     let mut groups: Vec<Range<usize>> = Vec::new();
-    for row in 0..loaded.q.len() {
-        match groups.last_mut() {
-            Some(group) if equal(group.start, row) && at_rest(loaded, group.start, row) => {
-                group.end = row + 1
+    // Smallest and largest value of every joint in the last group.
+    let mut span: Vec<(f64, f64)> = Vec::new();
+    for (row, q) in loaded.q.iter().enumerate() {
+        let wider = q.as_ref().map(|q| {
+            let both = span.iter().zip(q);
+            let wider = both.map(|(&(least, most), &q)| (least.min(q), most.max(q)));
+            wider.collect::<Vec<_>>()
+        });
+        let rests = |wider: &Vec<(f64, f64)>| {
+            let within = |(least, most): &(f64, f64)| most - least <= JITTER;
+            !wider.is_empty() && wider.iter().all(within)
+        };
+        match (groups.last_mut(), wider) {
+            (Some(group), Some(wider)) if rests(&wider) && at_rest(loaded, group.start, row) => {
+                group.end = row + 1;
+                span = wider;
             }
-            _ => groups.push(row..row + 1),
+            _ => {
+                groups.push(row..row + 1);
+                let own = q.iter().flatten().map(|&q| (q, q));
+                span = own.collect();
+            }
         }
     }
     groups
@@ -136,8 +149,22 @@ fn merge_rows(loaded: &mut Loaded, groups: &[Range<usize>]) {
                 .collect(),
         );
     }
-    loaded.q = firsts.iter().map(|row| loaded.q[*row].clone()).collect();
+    loaded.q = groups
+        .iter()
+        .map(|g| mean_values(&loaded.q[g.clone()]))
+        .collect();
     loaded.poses = kept;
+}
+
+/// Of rows that all have joint values, or of a single one.
+fn mean_values(rows: &[Option<Vec<f64>>]) -> Option<Vec<f64>> {
+    let first = rows[0].as_ref()?;
+    // About the first: equal values keep their last bit.
+    let mean = |joint: usize| {
+        let off = rows.iter().flatten().map(|q| q[joint] - first[joint]);
+        first[joint] + off.sum::<f64>() / rows.len() as f64
+    };
+    Some((0..first.len()).map(mean).collect())
 }
 
 fn mean_point(frames: &[Option<Point3<f64>>]) -> Option<Point3<f64>> {

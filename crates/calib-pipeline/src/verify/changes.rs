@@ -52,11 +52,12 @@ pub fn finding(inputs: &Inputs, fit: &MlFit, scan: &ChangeScan, beside: Beside) 
     let change = scan.significant()?;
     let names = Names { inputs, fit };
     let finding = names.described(change)?;
-    let rivals: Vec<String> = scan
-        .rivals()
-        .iter()
-        .filter_map(|c| names.of(c.moved))
-        .collect();
+    // The tracker that moved and the tracker that drifted have one name.
+    let is_tracker = |moved| matches!(moved, Moved::Reference(_) | Moved::Drift(_));
+    let rivals = scan.rivals().into_iter();
+    let others = rivals.filter(|c| !(is_tracker(c.moved) && is_tracker(change.moved)));
+    let mut rivals: Vec<String> = others.filter_map(|c| names.of(c.moved)).collect();
+    rivals.dedup();
     // What of the size is beyond doubt.
     let of = |name| finding.facts.get(name).and_then(Fact::value);
     let size = of("distance").map(|size| size - CERTAIN * of("sigma").unwrap_or(0.0));

@@ -25,7 +25,7 @@ impl ErrorSource {
             Self::NotModeled => [
                 "unexplained",
                 "residual that neither noise nor parameter uncertainty explains",
-                "Run again with `--select`, which tries the effects that the model lacks.",
+                "`--select` tries the effects that the model lacks; what it leaves is none of them.",
             ],
         }
     }

@@ -1,8 +1,11 @@
 //! What speaks against a result: one finding and one remedy each, and the place that shows the evidence.
 
+use std::cmp::Reverse;
+
 use calib_finding::Fact;
 
 use super::prose::{full_stop, sentence};
+use crate::diagnosis::NAMED_CAUSES;
 use crate::{Effect, Reason, ReasonId, Report};
 
 /// A warning or an objection.
@@ -18,7 +21,7 @@ pub(crate) struct Remark {
     pub(crate) place: &'static str,
 }
 
-/// Everything that speaks against the result, in the order of the verdict.
+/// Everything that speaks against the result, the gravest first: of what weighs the same, that which names the cause of errors.
 pub(crate) fn remarks(report: &Report) -> Vec<Remark> {
     if report.reason_facts.is_empty() {
         let of_text = |text: &String| Remark {
@@ -31,9 +34,17 @@ pub(crate) fn remarks(report: &Report) -> Vec<Remark> {
     }
     let against = report.reason_facts.iter();
     let against = against.filter(|reason| reason.effect != Effect::Supports);
-    against
-        .flat_map(|reason| of_reason(report, reason))
-        .collect()
+    let mut against: Vec<&Reason> = against.collect();
+    against.sort_by_key(|reason| (Reverse(reason.effect), !names_a_cause(reason)));
+    let all = against.into_iter();
+    all.flat_map(|reason| of_reason(report, reason)).collect()
+}
+
+/// Whether a reason is a finding that says why errors are as large as they are.
+fn names_a_cause(reason: &Reason) -> bool {
+    let id = reason.values.get("finding").and_then(Fact::word);
+    let mut causes = NAMED_CAUSES.iter();
+    id.is_some_and(|id| causes.any(|cause| cause.as_str() == id))
 }
 
 /// The findings behind a reason, or the reason itself.

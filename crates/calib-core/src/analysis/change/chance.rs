@@ -24,6 +24,7 @@ const OF_PRIORS: f64 = 0.4;
 const TOGETHER: usize = 10;
 
 /// Distribution of the largest T under the model.
+#[derive(Clone)]
 pub(super) struct Chance {
     /// By candidate: T that its best range exceeds in a tenth of the draws.
     pub quantiles: Vec<f64>,

@@ -217,7 +217,7 @@ fn shift_readings(of: &mut Solution, edge: EdgeId, by: f64, inside: &dyn Fn(usiz
 }
 
 /// Angle of a jump, rad.
-fn turned(what: Moved, jump: &[f64], of: &Solution) -> f64 {
+pub(super) fn turned(what: Moved, jump: &[f64], of: &Solution) -> f64 {
     match what {
         Moved::Joint(edge) => match &of.model.problem.edges[edge.index()].kind {
             EdgeKind::Joint(joint) if matches!(joint.axis, Axis::Revolute(_)) => jump[0].abs(),

@@ -24,11 +24,13 @@
 mod chance;
 pub(crate) mod columns;
 pub(crate) mod contest;
+mod dependent;
 mod exact;
 mod levels;
 mod scatter;
 mod sums;
 
+use std::cmp::Ordering;
 use std::collections::BTreeSet;
 
 use serde::{Deserialize, Serialize};
@@ -37,7 +39,8 @@ use crate::analysis::solution::Solution;
 use crate::graph::ids::{EdgeId, FrameId};
 use chance::Chance;
 use columns::Candidates;
-use exact::Scanned;
+use dependent::Seen;
+use exact::{Scanned, turned};
 use levels::{Best, Levels};
 pub use scatter::{BesideScatter, Left, Scatter};
 use sums::{Design, LEAST, SIMULATED};
@@ -155,6 +158,12 @@ impl ChangeScan {
 /// A change leaves the cost per row of the rows that the fit kept, times this, where it is why the others were rejected.
 const EXPLAINED: f64 = 1.5;
 
+/// No memory of a tracker looks like a turn by more than this, rad, and what is left of one without linearization looks like memory.
+const FAR: f64 = 0.05;
+
+/// Candidates that the memory of successive rows is found beside, the most significant ones; it costs about what the scan does.
+const ASKED: usize = 3;
+
 /// Ranges begin and end at so many samples at most; the best range is then refined to the sample.
 const EDGES: usize = 384;
 
@@ -246,7 +255,49 @@ impl Solution {
                 *change_of = exact;
             }
         }
-        changes.sort_by(|(_, a), (_, b)| b.excess.total_cmp(&a.excess).then(a.moved.cmp(&b.moved)));
+        changes.sort_by(by_excess);
+    }
+
+    /// Where something seems to have changed: the chance of that under the memory of the noise.
+    fn raise_for_memory(
+        &self,
+        changes: &mut [(usize, Change)],
+        found: &[Option<Best>],
+        scanned: &Scanned<'_>,
+        chance: &mut Chance,
+    ) {
+        let without = chance.clone();
+        let largest = |k: usize| without.quantiles[k] + without.threshold;
+        let mut least = f64::INFINITY;
+        let mut asked = BTreeSet::new();
+        while let Some((k, first)) = changes.first()
+            && first.excess > chance.threshold
+            && let Some(best) = found[*k].as_ref().filter(|best| best.level == 0)
+            && turned(first.moved, &best.found.jump, self) < FAR
+            && asked.insert(*k)
+        {
+            // Each is asked beside itself: a change is no memory, and is one beside another.
+            let seen = Seen {
+                scanned,
+                candidate: *k,
+                found: &best.found,
+            };
+            let k = seen.candidate;
+            let factor = if asked.len() <= ASKED {
+                self.memory_beside_change(&seen)
+            } else {
+                least
+            };
+            least = least.min(factor);
+            let under = factor * largest(k) - chance.threshold;
+            chance.quantiles[k] = chance.quantiles[k].max(under);
+            let under = self.largest_in_blocks(&seen, &without, largest(k)) - chance.threshold;
+            chance.quantiles[k] = chance.quantiles[k].max(under);
+            for (k, change) in changes.iter_mut() {
+                change.excess = change.score - chance.quantiles[*k];
+            }
+            changes.sort_by(by_excess);
+        }
     }
 
     fn scan(&self, settings: &ChangeSettings) -> Option<ChangeScan> {
@@ -270,7 +321,7 @@ impl Solution {
         // With few samples the scan itself is small enough to be simulated.
         let fewer = (thin.len() < used.len())
             .then(|| Design::new(self, &candidates, &thin, &thin, borders));
-        let chance = match fewer {
+        let mut chance = match fewer {
             Some(simulated) => {
                 let simulated = Levels::of(simulated?);
                 Chance::simulate(&simulated, &simulated.tests(), &seen, settings)
@@ -284,7 +335,7 @@ impl Solution {
                 changes.push((k, change(candidate.moved, found, at, quantile)));
             }
         }
-        changes.sort_by(|(_, a), (_, b)| b.excess.total_cmp(&a.excess).then(a.moved.cmp(&b.moved)));
+        changes.sort_by(by_excess);
         let scanned = Scanned {
             candidates: &candidates,
             samples: &used,
@@ -292,6 +343,7 @@ impl Solution {
             borders,
             design,
         };
+        self.raise_for_memory(&mut changes, &found, &scanned, &mut chance);
         self.refine(&mut changes, &found, &scanned, &chance);
         Some(ChangeScan {
             changes: changes.into_iter().map(|(_, c)| c).collect(),
@@ -301,6 +353,11 @@ impl Solution {
             scatter: None,
         })
     }
+}
+
+/// The most significant first.
+fn by_excess((_, a): &(usize, Change), (_, b): &(usize, Change)) -> Ordering {
+    b.excess.total_cmp(&a.excess).then(a.moved.cmp(&b.moved))
 }
 
 /// Whether most of the first few were rejected, and so many that a step can be told.

@@ -110,6 +110,8 @@ pub(super) struct Design {
     parts: Vec<usize>,
     /// Rᵀ of C = R Rᵀ.
     pub root: DMatrix<f64>,
+    /// Rᵀ Aᵀw at the values of the fit: zero where the samples are all that it used.
+    pub along: DVector<f64>,
     /// Columns with a prior, and 1/σ of it.
     pub priors: Vec<(usize, f64)>,
     /// F of equation (2).
@@ -165,6 +167,7 @@ impl Design {
             places,
             parts,
             root: DMatrix::zeros(0, 0),
+            along: DVector::zeros(0),
             priors: Vec::new(),
             cost: 0.0,
             rows: 0.0,
@@ -189,6 +192,38 @@ impl Design {
     /// T of equation (2).
     pub(super) fn score(&self, gain: f64) -> f64 {
         score(self.rows, self.cost, gain)
+    }
+
+    /// The step of the parameters that goes with a jump of what a set holds: δ = −R (Rᵀ Aᵀw + Rᵀ E ĉ).
+    pub(super) fn step_beside(&self, candidate: usize, found: &Found) -> DVector<f64> {
+        let jump = DVector::from_column_slice(&found.jump);
+        let along = &self.along + self.sum(candidate, &found.after).f * jump;
+        -self.root.tr_mul(&along)
+    }
+
+    /// First samples of the bins that ranges begin and end at, and one past the last.
+    pub(super) fn edges(&self) -> &[usize] {
+        &self.edges
+    }
+
+    /// Σ B̃ᵀB̃ of a candidate.
+    pub(super) fn whole(&self, candidate: usize) -> &DMatrix<f64> {
+        let sums = &self.cumulative[candidate];
+        &sums[sums.len() - 1].g
+    }
+
+    /// Σ B̃ᵀB̃ of a candidate between two edges, and EᵀCE: what of it the parameters take. `None` for other patterns than steps.
+    pub(super) fn between(
+        &self,
+        candidate: usize,
+        (from, to): (usize, usize),
+    ) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+        if self.patterns[candidate] != Pattern::Step {
+            return None;
+        }
+        let sums = &self.cumulative[candidate];
+        let f = &sums[to].f - &sums[from].f;
+        Some((&sums[to].g - &sums[from].g, f.tr_mul(&f)))
     }
 
     /// First sample after a change, and the first that is no longer.

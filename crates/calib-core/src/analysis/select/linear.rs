@@ -15,6 +15,7 @@ use crate::analysis::estimate::Trial;
 use crate::analysis::select::sample::Sample;
 use crate::analysis::select::stack::Stack;
 use crate::analysis::select::sums::Sums;
+use crate::analysis::successive::clustered;
 use crate::model::layout::Model;
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::whitened::{Whitened, covariance_of, whitened};
@@ -328,11 +329,9 @@ impl Fitted<'_> {
         };
         let per_sample = self.of_each(of_sample);
         let collect = |k: usize| {
-            let size = blocks[k].len();
-            let mut clusters = DMatrix::zeros(size, size);
-            for (_, sample) in &per_sample {
-                clusters.ger(self.linear.factor, &sample[k].1, &sample[k].1, 1.0);
-            }
+            let shares = per_sample.iter().map(|(_, sample)| sample[k].1.clone());
+            let clusters = clustered(&shares.collect::<Vec<_>>(), blocks[k].len());
+            let clusters = clusters * self.linear.factor;
             (per_sample.iter().map(|s| s.1[k].0).collect(), clusters)
         };
         Extended {

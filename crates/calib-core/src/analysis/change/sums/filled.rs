@@ -183,7 +183,12 @@ impl Design {
     }
 
     /// What a candidate's columns are multiplied by at a sample: its place from −½ to ½ for a drift.
-    fn factor(&self, candidate: usize, place: usize, samples: usize) -> f64 {
+    pub(in crate::analysis::change) fn factor(
+        &self,
+        candidate: usize,
+        place: usize,
+        samples: usize,
+    ) -> f64 {
         match self.patterns[candidate] {
             Pattern::Linear => place as f64 / (samples - 1) as f64 - 0.5,
             _ => 1.0,
@@ -208,6 +213,7 @@ impl Design {
                 u -= sum.f.tr_mul(&along);
             }
         });
+        self.along = along;
         for (c, &p) in model.columns.iter().enumerate() {
             if let Some(sigma) = model.problem.parameters[p].prior_sigma {
                 self.priors.push((c, 1.0 / sigma));
