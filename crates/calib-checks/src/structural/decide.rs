@@ -11,7 +11,7 @@ use super::few;
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{JointIndex, SampleIndex};
 use super::jump::jump;
-use super::likelihood::{Opinion, opinion};
+use super::likelihood::{Opinion, errors_explain, has_unknowns, opinion};
 use super::naming::{Asked, EQUIVALENT_WITHIN, on_twin};
 use super::outcome::{Correction, Decision, Design, Evidence, Named, Options, Outcome};
 use super::ranking::{Ranking, distinct, few_samples, ratio};
@@ -280,6 +280,14 @@ fn decide(asked: &Asked<'_>, outcome: &Outcome) -> Decision {
         Opinion::Against => true,
         Opinion::Open => false,
     };
+    // A frame of its own for a recording of few postures takes errors of the robot: where these explain all, nothing has moved.
+    let is_frame = |named: &Named| {
+        let mut scoped = named.correction.iter();
+        scoped.all(|scoped| has_unknowns(&scoped.hypothesis))
+    };
+    if !alarm && single.as_ref().is_some_and(is_frame) && errors_explain(asked) {
+        return consistent;
+    }
     if let Some(named) = settled_by_residual.filter(|_| !against) {
         return Decision::Named(named.clone());
     }

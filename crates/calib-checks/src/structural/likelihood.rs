@@ -77,6 +77,12 @@ pub(super) fn opinion(asked: &Asked<'_>, named: Option<&Named>, invisible: &[Sco
     }
 }
 
+/// Whether errors of the robot within the priors leave no more than noise of the data as they are.
+pub(super) fn errors_explain(asked: &Asked<'_>) -> bool {
+    let without = fitted(asked.data, asked.screened, asked.options);
+    without.is_some_and(|without| without.sigma <= QUIETER * asked.options.sigma)
+}
+
 /// The leaders with what they gain, the likeliest first. None where errors of the robot leave no more than noise of the data as they are,
 /// and no mistake was named that might be worse.
 fn judged<'a>(asked: &Asked<'a>, invisible: &[Scoped], named: bool) -> Vec<Judged<'a>> {
@@ -121,7 +127,7 @@ fn stands_out(judged: &[Judged<'_>], options: &Options) -> bool {
 }
 
 /// A frame, a mount or readings of its own, or another density of what was measured.
-fn has_unknowns(hypothesis: &Hypothesis) -> bool {
+pub(super) fn has_unknowns(hypothesis: &Hypothesis) -> bool {
     matches!(
         hypothesis,
         Hypothesis::TrackerMoved

@@ -1,4 +1,5 @@
-//! Couplings that the profile declares: their factor is unknown, so the one that the registration fits best is taken.
+//! Couplings that the profile declares: their factor is unknown, so the one that the registration fits best is taken, where it fits clearly better.
+//! A small coupling is hidden under the errors of the nominal robot, and a factor that fits these is none.
 
 use calib_checks::structural::{Chain, Data, JointIndex, registration_residual, thin};
 
@@ -10,6 +11,8 @@ const RANGE: f64 = 2.0;
 const STEPS: i32 = 8;
 /// Golden-section steps: 0.618²⁰ of a step is 2e-5.
 const REFINEMENTS: usize = 20;
+/// A coupling that is not small divides the residual by more: the ratio that names a mistake.
+const CLEARLY: f64 = 1.5;
 /// Rows that a factor needs: it is one number.
 const ROWS: usize = 200;
 
@@ -60,7 +63,8 @@ fn best_factor(data: &Data, joint: JointIndex, source: JointIndex) -> Option<f64
         registration_residual(&with).ok()
     };
     let step = RANGE / f64::from(STEPS);
-    let mut best = (residual(0.0)?, 0.0);
+    let without = residual(0.0)?;
+    let mut best = (without, 0.0);
     for k in -STEPS..=STEPS {
         let factor = step * f64::from(k);
         let r = residual(factor)?;
@@ -78,5 +82,6 @@ fn best_factor(data: &Data, joint: JointIndex, source: JointIndex) -> Option<f64
             low = a;
         }
     }
-    Some(0.5 * (low + high))
+    let found = 0.5 * (low + high);
+    (CLEARLY * residual(found)? < without).then_some(found)
 }
