@@ -102,3 +102,33 @@ fn a_plan_that_is_impossible_says_what_removes_the_postures() {
     );
     assert!(!dir.path("out/plan.csv").exists());
 }
+
+/// `trajectory.json` of an earlier plan leads through what a later one keeps out of.
+#[test]
+fn a_trajectory_that_is_not_written_does_not_remain() {
+    let dir = Scratch::new().robot("ripley");
+    let out = dir.path("out");
+    let folder = calib_files::ResultsFolder::open(&out).expect("a folder");
+    let old = [calib_files::OutputFile::text("trajectory.json", "{}")];
+    folder.write(&old).expect("written");
+    // Postures on both sides of a wall: no motion between them is free.
+    let profile = dir.path("robots/ripley.yaml");
+    let text = std::fs::read_to_string(&profile).expect("a profile");
+    let cut = "plan:\n  clearance_mm: 150\n";
+    std::fs::write(&profile, text + cut).expect("written");
+    let ran = dir.calib([
+        "plan",
+        "robots/ripley.yaml",
+        "--poses",
+        "6",
+        "--candidates",
+        "64",
+        "--out",
+        "out",
+    ]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let blocked = ran.stdout.contains("is not written");
+    assert!(blocked, "{}", ran.stdout);
+    assert!(!dir.path("out/trajectory.json").exists(), "{}", ran.stdout);
+    assert!(!dir.read("out/calib.manifest").contains("trajectory"));
+}

@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 
 use crate::candidates::Counts;
 use crate::list::{Goal, Why};
-use crate::note::Note;
+use crate::note::{JointNoiseOf, Note};
 
 /// A length with its unit; what is not determined says so.
 #[must_use]
@@ -108,6 +108,12 @@ pub fn most_removing(counts: &Counts) -> String {
     }
 }
 
+/// What the reasons in `plan.csv` mean that a person must know who moves the robot.
+pub const OF_TABLE: [&str; 2] = [
+    "move from row to row in this order; `note` is the reason of each posture",
+    "`detour`: only on the way around an obstacle, do not record",
+];
+
 /// Why a posture is in the list.
 #[must_use]
 pub fn why(why: Why) -> &'static str {
@@ -161,6 +167,109 @@ fn of_pairs(pairs: &[[String; 2]]) -> String {
     pairs.iter().map(of).collect::<Vec<_>>().join(", ")
 }
 
+/// The noise of the joints, and where it is taken from.
+#[must_use]
+pub fn joint_noise(sigma: f64, of: JointNoiseOf) -> String {
+    let sigma = number::plain(sigma, Unit::Radian);
+    match of {
+        JointNoiseOf::Recordings => {
+            format!("Noise of the joints: {sigma}, as the recordings show it.")
+        }
+        JointNoiseOf::Solve => format!("Noise of the joints: {sigma} (`solve.noise.joint_deg`)."),
+        JointNoiseOf::Simulation => {
+            format!("Noise of the joints: {sigma} (`simulate.noise.joint_deg`).")
+        }
+        JointNoiseOf::Program => format!(
+            "Noise of the joints: {sigma}, assumed. State `solve.noise.joint_deg` if you know it."
+        ),
+    }
+}
+
+/// What to do about shapes that could not be read.
+const READ_THEM: &str = "Put the files where the URDF names them, or state the folders of their packages under `robot.packages`.";
+
+/// Links with the files of their shapes.
+fn of_shapes(shapes: &[(String, Option<String>)]) -> String {
+    let of = |(link, file): &(String, Option<String>)| match file {
+        Some(file) => format!("`{link}` ({file})"),
+        None => format!("`{link}`"),
+    };
+    shapes.iter().map(of).collect::<Vec<_>>().join(", ")
+}
+
+/// Whether a note says what motions are not checked for.
+#[must_use]
+pub fn is_unchecked(note: &Note) -> bool {
+    unchecked(std::slice::from_ref(note)).is_some()
+}
+
+/// What motions are not checked for, in one sentence; `None`: nothing is known to be left out.
+#[must_use]
+pub fn unchecked(notes: &[Note]) -> Option<String> {
+    let mut parts = Vec::new();
+    for note in notes {
+        match note {
+            Note::PairsNotCompared { pairs } => {
+                let of = pairs.iter().map(|[a, b]| format!("`{a}` with `{b}`"));
+                parts.push(some(&of.collect::<Vec<_>>()));
+            }
+            Note::NoShape { links } => {
+                let of = links.iter().map(|link| format!("`{link}`"));
+                parts.push(format!(
+                    "links without shapes ({})",
+                    some(&of.collect::<Vec<_>>())
+                ));
+            }
+            Note::ShapeUnread { shapes } => {
+                let of = shapes.iter().map(|(link, _)| format!("`{link}`"));
+                let of = some(&of.collect::<Vec<_>>());
+                parts.push(format!("links whose shapes could not be read ({of})"));
+            }
+            _ => {}
+        }
+    }
+    (!parts.is_empty()).then(|| parts.join("; "))
+}
+
+/// The first few, and how many there are besides.
+fn some(all: &[String]) -> String {
+    const MOST: usize = 3;
+    let mut shown = all.iter().take(MOST).cloned().collect::<Vec<_>>();
+    if all.len() > MOST {
+        shown.push(format!("{} more", all.len() - MOST));
+    }
+    shown.join(", ")
+}
+
+/// What to do with the files.
+#[must_use]
+pub fn record_them(folder: &str, detours: usize, trajectory: bool, notes: &[Note]) -> String {
+    let mut text = format!(
+        "Record the postures of {folder}/plan.csv, moving from row to row in this order; see {folder}/plan.html."
+    );
+    if detours > 0 {
+        text += &format!(
+            " {} on the way around obstacles only (`note` is `detour`): move there, but do not record.",
+            if detours == 1 {
+                "1 row is".to_owned()
+            } else {
+                format!("{detours} rows are")
+            }
+        );
+    }
+    if let Some(unchecked) = unchecked(notes) {
+        let what = if trajectory {
+            "plan.csv and trajectory.json"
+        } else {
+            "plan.csv"
+        };
+        text += &format!(
+            " The motions of {what} are not checked for collisions of {unchecked}: move slowly the first time."
+        );
+    }
+    text
+}
+
 /// A note as a sentence, with what to do.
 #[must_use]
 pub fn note(note: &Note) -> String {
@@ -194,18 +303,45 @@ pub fn note(note: &Note) -> String {
             "Collisions are not checked for links without shapes: {}.",
             names(links)
         ),
-        Note::SurroundingsUnchecked { stated, links } => format!(
-            "{} not compared with links without shapes: {}. The plan may move them through. Give them `<collision>` shapes in the URDF.",
-            if stated.len() == 1 { format!("{} is", names(stated)) } else { format!("{} are", names(stated)) },
+        Note::SurroundingsUnchecked { stated, links, unread } => {
+            let is = if stated.len() == 1 { "is" } else { "are" };
+            let mut text = format!("{} {is} not compared with", names(stated));
+            if !links.is_empty() {
+                text += &format!(" links without shapes: {}", names(links));
+            }
+            if !unread.is_empty() {
+                let also = if links.is_empty() { "" } else { ", nor with" };
+                text += &format!("{also} shapes that could not be read: {}", of_shapes(unread));
+            }
+            text += ". The plan may move them through.";
+            if !links.is_empty() {
+                text += " Give links `<collision>` shapes in the URDF.";
+            }
+            if !unread.is_empty() {
+                text += &format!(" {READ_THEM}");
+            }
+            text
+        }
+        Note::StandsThere { stated, links } => format!(
+            "In contact with {} in every posture, because no planned joint moves them, and not compared with it: {}.",
+            names(stated),
             names(links)
         ),
         Note::NoRoom { joints } => format!(
             "Held, because their limits in the URDF leave no range: {}. Correct the limits to move them.",
             names(joints)
         ),
-        Note::ShapeUnread { links } => format!(
-            "Some shapes could not be read, and collisions with them are not checked: {}.",
-            names(links)
+        Note::NarrowedByFollower { joints } => {
+            let of = |[joint, follower]: &[String; 2]| format!("`{joint}` (`{follower}`)");
+            let all: Vec<String> = joints.iter().map(of).collect();
+            format!(
+                "Ranges of `plan.joints` narrowed by the limits of a joint that follows: {}.",
+                all.join(", ")
+            )
+        }
+        Note::ShapeUnread { shapes } => format!(
+            "Collisions are not checked for shapes that could not be read: {}. {READ_THEM}",
+            of_shapes(shapes)
         ),
         Note::PairsNotCompared { pairs } => format!(
             "Not compared, because their capsules overlap in nearly all postures: {}. Watch them in the first run.",
@@ -215,6 +351,7 @@ pub fn note(note: &Note) -> String {
             "Nearer than the clearance in nearly all postures, and kept from touching only: {}.",
             of_pairs(pairs)
         ),
+        Note::JointNoise { sigma, of } => joint_noise(*sigma, *of),
         Note::EverythingSeen => {
             "No cameras are stated: every marker counts as seen. State `plan.cameras` where markers can be hidden.".to_owned()
         }
