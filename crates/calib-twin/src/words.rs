@@ -74,6 +74,18 @@ pub fn calibrated(whole: usize, trials: usize) -> String {
     )
 }
 
+/// What the settings of trials are called that do not go together.
+pub(crate) const SEED: &str = "`--seed`";
+/// See [`SEED`].
+pub(crate) const HOW: &str = "`--truth` or `--noise-times`";
+/// See [`SEED`].
+pub(crate) const VERSION: &str = "the version of the program";
+
+/// What the rows of a recording, or of a plan in its place, are called.
+pub(crate) fn rows_of(recording: &str) -> String {
+    format!("the postures of `{recording}` (recorded or planned)")
+}
+
 /// A note as a sentence.
 #[must_use]
 pub fn note(note: &Note) -> String {
