@@ -399,6 +399,23 @@ const PAIRS: &str = "flange_x,flange_y,flange_z,flange_qx,flange_qy,flange_qz,fl
 1.1,2,3,0,0,0,1,1,2.1,3,0,0,0,1
 ";
 
+/// A URDF with a fault is to be corrected, and no command helps.
+#[test]
+fn a_faulty_urdf_has_a_remedy_that_fits() {
+    let dir = Scratch::new();
+    let good = std::fs::read_to_string(root().join("book/src/tutorial/arm.urdf")).expect("a URDF");
+    for number in ["nan", "0,05"] {
+        let at = good.find("xyz=\"").expect("an origin") + 5;
+        let end = at + good[at..].find(' ').expect("a blank");
+        let bad = format!("{}{number}{}", &good[..at], &good[end..]);
+        std::fs::write(dir.path("bad.urdf"), bad).expect("written");
+        let ran = dir.calib(["init", "bad.urdf", "--out", "it.yaml"]);
+        assert_eq!(ran.code, 2, "{}", ran.stderr);
+        assert!(ran.stderr.contains("correct it there"), "{}", ran.stderr);
+        assert!(!ran.stderr.contains("shows the commands"), "{}", ran.stderr);
+    }
+}
+
 #[test]
 fn bad_calls_are_refused_and_write_nothing() {
     let urdf = std::fs::read(root().join("book/src/tutorial/arm.urdf")).expect("committed");

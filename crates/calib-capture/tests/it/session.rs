@@ -536,3 +536,24 @@ fn a_motion_has_no_poses() {
     drop(scene);
     assert_eq!(holds(&path).len(), 1);
 }
+
+#[test]
+fn after_a_restart_of_the_tracker_nothing_advises_to_append() {
+    for restarts in [false, true] {
+        let folder = tempfile::tempdir().expect("folder");
+        let mut scene = Scene::new(&folder.path().join("a.csv"), plan(JointSource::Targets, 3));
+        scene.key(Key::There);
+        scene.stay(110);
+        scene.go(0.0);
+        scene.key(Key::Skip);
+        if restarts {
+            scene.number = 0;
+            scene.stay(60);
+        }
+        scene.session.report(&mut scene.said);
+        let said = &scene.said.0;
+        assert!(said.contains("missing: pose 2"), "{said}");
+        assert_eq!(said.contains("in a new file"), restarts, "{said}");
+        assert_eq!(said.contains("--append"), !restarts, "{said}");
+    }
+}
