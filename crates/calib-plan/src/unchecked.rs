@@ -67,7 +67,8 @@ fn of_shapes(known: &Known, joints: &JointBox, scene: &Scene, unread: &[Unread])
     let boxes = spec.keep_outs.keys().map(|k| format!("plan.keep_outs.{k}"));
     let stated: Vec<String> = ground.into_iter().chain(boxes).collect();
     let mut notes = Vec::new();
-    if !stated.is_empty() && !(links.is_empty() && shapes.is_empty()) {
+    let any = !links.is_empty() || !shapes.is_empty();
+    if any && !stated.is_empty() {
         notes.push(Note::SurroundingsUnchecked {
             stated: stated.clone(),
             links: links.clone(),

@@ -270,13 +270,41 @@ pub fn record_them(folder: &str, detours: usize, trajectory: bool, notes: &[Note
     text
 }
 
+fn names(names: &[String]) -> String {
+    let quoted: Vec<String> = names.iter().map(|n| format!("`{n}`")).collect();
+    quoted.join(", ")
+}
+
+fn surroundings_unchecked(
+    stated: &[String],
+    links: &[String],
+    unread: &[(String, Option<String>)],
+) -> String {
+    let is = if stated.len() == 1 { "is" } else { "are" };
+    let mut text = format!("{} {is} not compared with", names(stated));
+    if !links.is_empty() {
+        text += &format!(" links without shapes: {}", names(links));
+    }
+    if !unread.is_empty() {
+        let also = if links.is_empty() { "" } else { ", nor with" };
+        text += &format!(
+            "{also} shapes that could not be read: {}",
+            of_shapes(unread)
+        );
+    }
+    text += ". The plan may move them through.";
+    if !links.is_empty() {
+        text += " Give links `<collision>` shapes in the URDF.";
+    }
+    if !unread.is_empty() {
+        text += &format!(" {READ_THEM}");
+    }
+    text
+}
+
 /// A note as a sentence, with what to do.
 #[must_use]
 pub fn note(note: &Note) -> String {
-    let names = |names: &[String]| {
-        let quoted: Vec<String> = names.iter().map(|n| format!("`{n}`")).collect();
-        quoted.join(", ")
-    };
     match note {
         Note::NotRecordedYet { recordings } => {
             format!("Not recorded yet: {}. The plan does not count on them.", names(recordings))
@@ -303,25 +331,11 @@ pub fn note(note: &Note) -> String {
             "Collisions are not checked for links without shapes: {}.",
             names(links)
         ),
-        Note::SurroundingsUnchecked { stated, links, unread } => {
-            let is = if stated.len() == 1 { "is" } else { "are" };
-            let mut text = format!("{} {is} not compared with", names(stated));
-            if !links.is_empty() {
-                text += &format!(" links without shapes: {}", names(links));
-            }
-            if !unread.is_empty() {
-                let also = if links.is_empty() { "" } else { ", nor with" };
-                text += &format!("{also} shapes that could not be read: {}", of_shapes(unread));
-            }
-            text += ". The plan may move them through.";
-            if !links.is_empty() {
-                text += " Give links `<collision>` shapes in the URDF.";
-            }
-            if !unread.is_empty() {
-                text += &format!(" {READ_THEM}");
-            }
-            text
-        }
+        Note::SurroundingsUnchecked {
+            stated,
+            links,
+            unread,
+        } => surroundings_unchecked(stated, links, unread),
         Note::StandsThere { stated, links } => format!(
             "In contact with {} in every posture, because no planned joint moves them, and not compared with it: {}.",
             names(stated),

@@ -1,7 +1,8 @@
 //! What a table says in a way of its own: numbers for hidden markers, two reversed joints, clocks far apart, bodies named like links.
 
 use calib_init::fact::Mistake;
-use calib_init::{About, Fact, propose, words};
+use calib_init::source::Source;
+use calib_init::{About, Fact, propose, session, tables, words};
 use calib_sim::Motion;
 use calib_urdf::RobotModel;
 
@@ -141,6 +142,23 @@ fn clocks_far_apart_are_brought_together_and_the_profile_says_how_far() {
             "{written}"
         );
     }
+    // Without it, the message has the offsets at which they overlap.
+    let both = streams(&hand, Motion::Continuous, 47.0, 85);
+    let given = [
+        file("run_tracker", text(&both.tracker)),
+        file("run_robot", text(&both.robot)),
+    ];
+    let sources = given.iter().map(|f| Source::read(&arm(), f));
+    let sources: Vec<Source> = sources.collect::<Result<_, _>>().expect("tables");
+    let (drafts, _) = session::drafts(&arm(), &sources).expect("recordings");
+    let mut without = proposed(&given);
+    without.recordings[0].max_offset = None;
+    let error = tables::tables(&arm(), &without, &drafts, &sources).expect_err("too far");
+    let said = error.to_string();
+    assert!(
+        said.contains("offsets up to 10.0 s are looked for"),
+        "{said}"
+    );
     let both = streams(&hand, Motion::Continuous, 2.0, 85);
     let near = proposed(&[
         file("run_tracker", text(&both.tracker)),
