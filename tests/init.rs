@@ -393,11 +393,78 @@ fn from_a_urdf_alone_to_a_plan_and_a_run() {
     assert!(ran.code < 2, "{}{}", ran.stdout, ran.stderr);
 }
 
+/// An arm beside which another one is bent at 0, and that slides where 0 is out of reach.
+#[test]
+fn postures_that_nothing_asks_for_are_within_all_limits() {
+    let joint = |name: &str, kind: &str, parent: &str, axis: &str, limits: [f64; 2]| {
+        format!(
+            "<link name=\"{name}_l\"/><joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{name}_l\"/>\
+             <origin xyz=\"0.1 0 0.3\"/><axis xyz=\"{axis}\"/><limit lower=\"{}\" upper=\"{}\" effort=\"9\" velocity=\"1\"/></joint>",
+            limits[0], limits[1]
+        )
+    };
+    let urdf = [
+        "<robot name=\"cell\"><link name=\"base\"/>".to_owned(),
+        joint("lift", "prismatic", "base", "0 0 1", [0.2, 0.9]),
+        joint("a1", "revolute", "lift_l", "0 0 1", [-2.0, 2.0]),
+        joint("a2", "revolute", "a1_l", "0 1 0", [-1.5, 1.5]),
+        joint("a3", "revolute", "a2_l", "1 0 0", [-2.0, 2.0]),
+        joint("elbow", "revolute", "base", "0 1 0", [-2.3, -0.5]),
+        "</robot>".to_owned(),
+    ]
+    .concat();
+    let dir = Scratch::new().file("cell.urdf", urdf);
+    let done = |call: &[&str]| {
+        let ran = dir.calib_with(call);
+        assert!(ran.code < 2, "{call:?}: {}{}", ran.stdout, ran.stderr);
+        format!("{}{}", ran.stdout, ran.stderr)
+    };
+    let profile = "robots/cell.yaml";
+    done(&["init", "cell.urdf", "--markers-on", "a3_l"]);
+    done(&[
+        "plan",
+        profile,
+        "--poses",
+        "8",
+        "--candidates",
+        "128",
+        "--out",
+        "plan",
+    ]);
+    for plan in [None, Some("plan/plan.yaml")] {
+        let mut call = vec!["simulate", profile, "--out", "robots/cell"];
+        call.extend(plan.iter().flat_map(|plan| ["--plan", plan]));
+        done(&call);
+        let table = dir.read("robots/cell/poses.csv");
+        assert!(table.contains("elbow"), "{table}");
+        let said = done(&["check", profile, "--json"]);
+        assert!(!said.contains("joint-outside-limits"), "{plan:?}: {said}");
+    }
+}
+
 /// Poses of a flange and of a tracked body, and no joints.
 const PAIRS: &str = "flange_x,flange_y,flange_z,flange_qx,flange_qy,flange_qz,flange_qw,meas_x,meas_y,meas_z,meas_qx,meas_qy,meas_qz,meas_qw
 1,2,3,0,0,0,1,1,2,3,0,0,0,1
 1.1,2,3,0,0,0,1,1,2.1,3,0,0,0,1
 ";
+
+/// A URDF with a fault is to be corrected, and no command helps.
+#[test]
+fn a_faulty_urdf_has_a_remedy_that_fits() {
+    let dir = Scratch::new();
+    let good = std::fs::read_to_string(root().join("book/src/tutorial/arm.urdf")).expect("a URDF");
+    for number in ["nan", "0,05"] {
+        let joint = good.find("<joint").expect("a joint");
+        let at = joint + good[joint..].find("xyz=\"").expect("an origin") + 5;
+        let end = at + good[at..].find(' ').expect("a blank");
+        let bad = format!("{}{number}{}", &good[..at], &good[end..]);
+        std::fs::write(dir.path("bad.urdf"), bad).expect("written");
+        let ran = dir.calib(["init", "bad.urdf", "--out", "it.yaml"]);
+        assert_eq!(ran.code, 2, "{}", ran.stderr);
+        assert!(ran.stderr.contains("correct it there"), "{}", ran.stderr);
+        assert!(!ran.stderr.contains("shows the commands"), "{}", ran.stderr);
+    }
+}
 
 #[test]
 fn bad_calls_are_refused_and_write_nothing() {

@@ -102,3 +102,44 @@ fn a_plan_that_is_impossible_says_what_removes_the_postures() {
     );
     assert!(!dir.path("out/plan.csv").exists());
 }
+
+/// An arm of two joints with a wall in the middle of the range of the first: no way leads around it.
+const WALLED: &str = "<robot name=\"walled\"><link name=\"base\"/><link name=\"arm\"/><link name=\"tip\">
+<collision><origin xyz=\"0.5 0 0\"/><geometry><sphere radius=\"0.05\"/></geometry></collision></link>
+<joint name=\"j1\" type=\"revolute\"><parent link=\"base\"/><child link=\"arm\"/><axis xyz=\"0 0 1\"/>
+<limit lower=\"-2\" upper=\"2\" effort=\"1\" velocity=\"1\"/></joint>
+<joint name=\"j2\" type=\"revolute\"><parent link=\"arm\"/><child link=\"tip\"/><axis xyz=\"1 0 0\"/>
+<limit lower=\"-2\" upper=\"2\" effort=\"1\" velocity=\"1\"/></joint></robot>
+";
+
+/// `trajectory.json` of an earlier plan leads through what a later one keeps out of.
+#[test]
+fn a_trajectory_that_is_not_written_does_not_remain() {
+    let dir = Scratch::new().file("walled.urdf", WALLED);
+    let made = dir.calib(["init", "walled.urdf"]);
+    assert_eq!(made.code, 0, "{}", made.stderr);
+    let profile = dir.path("robots/walled.yaml");
+    let plan = || {
+        let ran = dir.calib([
+            "plan",
+            "robots/walled.yaml",
+            "--poses",
+            "8",
+            "--candidates",
+            "64",
+            "--out",
+            "out",
+        ]);
+        assert_eq!(ran.code, 0, "{}", ran.stderr);
+        ran.stdout
+    };
+    let free = plan();
+    assert!(dir.path("out/trajectory.json").exists(), "{free}");
+    let text = std::fs::read_to_string(&profile).expect("a profile");
+    let wall = "\nplan:\n  keep_outs:\n    wall: {size_mm: [300, 80, 300], center: {xyz_mm: [500, 0, 0]}}\n";
+    std::fs::write(&profile, text + wall).expect("written");
+    let blocked = plan();
+    assert!(blocked.contains("is not written"), "{blocked}");
+    assert!(!dir.path("out/trajectory.json").exists(), "{blocked}");
+    assert!(!dir.read("out/calib.manifest").contains("trajectory"));
+}

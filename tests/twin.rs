@@ -102,7 +102,13 @@ fn a_plan_has_a_twin_and_a_plan_for_another_robot_has_none() {
     ];
     let ran = dir.calib(twin);
     assert_eq!(ran.code, 0, "{}", ran.stderr);
-    assert!(ran.stdout.contains("of the plan"), "{}", ran.stdout);
+    let words: Vec<&str> = ran.stdout.split_whitespace().collect();
+    let said = words.join(" ");
+    assert!(said.contains("of the plan"), "{said}");
+    assert!(
+        said.contains("joints have a noise of") && said.contains(".noise.joint_deg`"),
+        "{said}"
+    );
     let dir = dir.edit("plan/plan.yaml", "robot: arm", "robot: leg");
     let ran = dir.calib(twin);
     assert_eq!(ran.code, 3, "{}", ran.stderr);

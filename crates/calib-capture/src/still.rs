@@ -1,4 +1,7 @@
 //! Whether everything that is seen stands still.
+//!
+//! The limits follow the noise that is seen. Second differences of a track have little of a smooth motion and all of white noise: for σ per coordinate
+//! |x₂ − 2x₁ + x₀| has the median √6·1.54 σ = 3.8 σ, and two samples of a body that stands still differ by more than √2·6.4 σ = 9 σ once in 10⁸ times.
 
 use crate::Frame;
 use nalgebra::{Isometry3, Point3};
@@ -31,8 +34,17 @@ impl Default for StillSettings {
 pub struct Stillness {
     settings: StillSettings,
     recent: VecDeque<(f64, BTreeMap<String, Isometry3<f64>>)>,
+    /// Second differences of each, m and rad.
+    shaking: BTreeMap<String, VecDeque<(f64, f64)>>,
     since: Option<f64>,
 }
+
+/// Second differences that the noise is taken from: about a second.
+const SHAKING: usize = 60;
+/// Fewer of them tell no noise.
+const FEWEST: usize = 20;
+/// By how much two samples of what stands still may differ, in medians of the second differences: 9 σ.
+const OF_MEDIAN: f64 = 9.0 / 3.8;
 
 impl Stillness {
     /// Nothing seen yet.
@@ -40,6 +52,7 @@ impl Stillness {
         Stillness {
             settings,
             recent: VecDeque::new(),
+            shaking: BTreeMap::new(),
             since: None,
         }
     }
@@ -63,6 +76,7 @@ impl Stillness {
             self.since = self.since.filter(|_| moment);
             return self.since.map(|since| t - since);
         }
+        self.note_shaking(&seen);
         self.recent.push_back((t, seen));
         while self
             .recent
@@ -93,8 +107,9 @@ impl Stillness {
             }
             (name.clone(), far, turned)
         };
-        let size = |(_, far, turned): &(String, f64, f64)| {
-            (far / self.settings.point_range).max(turned / self.settings.turn_range)
+        let size = |(name, far, turned): &(String, f64, f64)| {
+            let (point, turn) = self.ranges(name);
+            (far / point).max(turned / turn)
         };
         let each = last.iter().map(of);
         each.max_by(|a, b| size(a).total_cmp(&size(b)))
@@ -105,13 +120,51 @@ impl Stillness {
             return false;
         };
         // Half the range to either side of the last sample is at most the range between any two.
-        let near = |a: &Isometry3<f64>, b: &Isometry3<f64>| {
-            (a.translation.vector - b.translation.vector).norm() <= self.settings.point_range
-                && a.rotation.angle_to(&b.rotation) <= self.settings.turn_range
-        };
-        self.recent.iter().all(|(_, earlier)| {
-            last.iter()
-                .all(|(name, pose)| earlier.get(name).is_none_or(|other| near(pose, other)))
+        last.iter().all(|(name, pose)| {
+            let (point, turn) = self.ranges(name);
+            let near = |other: &Isometry3<f64>| {
+                (pose.translation.vector - other.translation.vector).norm() <= point
+                    && pose.rotation.angle_to(&other.rotation) <= turn
+            };
+            let mut earlier = self.recent.iter().filter_map(|(_, seen)| seen.get(name));
+            earlier.all(near)
         })
+    }
+
+    /// Ranges within which something stands still, m and rad: the usual ones, or what its noise needs.
+    fn ranges(&self, name: &str) -> (f64, f64) {
+        let (usual, turn) = (self.settings.point_range, self.settings.turn_range);
+        let Some(shaking) = self.shaking.get(name).filter(|s| s.len() >= FEWEST) else {
+            return (usual, turn);
+        };
+        let median = |of: fn(&(f64, f64)) -> f64| {
+            let mut all: Vec<f64> = shaking.iter().map(of).collect();
+            all.sort_by(f64::total_cmp);
+            all[all.len() / 2]
+        };
+        (
+            usual.max(OF_MEDIAN * median(|s| s.0)),
+            turn.max(OF_MEDIAN * median(|s| s.1)),
+        )
+    }
+
+    /// Takes the second differences that a new frame makes with the last two.
+    fn note_shaking(&mut self, seen: &BTreeMap<String, Isometry3<f64>>) {
+        let mut before = self.recent.iter().rev();
+        let (Some((_, first)), Some((_, second))) = (before.next(), before.next()) else {
+            return;
+        };
+        for (name, x2) in seen {
+            let (Some(x1), Some(x0)) = (first.get(name), second.get(name)) else {
+                continue;
+            };
+            let bend = x2.translation.vector - x1.translation.vector * 2.0 + x0.translation.vector;
+            let turns = [x1.rotation / x0.rotation, x2.rotation / x1.rotation];
+            let all = self.shaking.entry(name.clone()).or_default();
+            all.push_back((bend.norm(), turns[0].angle_to(&turns[1])));
+            if all.len() > SHAKING {
+                all.pop_front();
+            }
+        }
     }
 }

@@ -257,7 +257,7 @@ impl CliError {
             | Self::Twin(
                 TwinError::Pipeline(error) | TwinError::Plan(PlanError::Pipeline(error)),
             ) => Some(error.remedy()),
-            Self::Apply(ApplyError::Read(_)) => {
+            Self::Apply(ApplyError::Read(_)) | Self::Init(InitError::Urdf(_)) => {
                 Some("correct it there, or export the nominal URDF again")
             }
             Self::Apply(ApplyError::Edit(_)) => Some("nothing was written; give the expanded URDF"),

@@ -30,6 +30,8 @@ const LARGEST_MANIFEST: u64 = 1 << 20;
 /// Dropped before, it leaves nothing behind: folders that it made are removed if they are empty.
 #[derive(Debug)]
 pub struct ResultsFolder {
+    /// Names of files that must not remain from an earlier run.
+    outdated: Vec<String>,
     folder: PathBuf,
     /// The folders that were made, outermost first.
     made: Vec<PathBuf>,
@@ -66,11 +68,20 @@ impl ResultsFolder {
             folder: folder.to_path_buf(),
             made,
             lock: None,
+            outdated: Vec::new(),
         };
         done?;
         results.lock = lock(folder)?;
         clean(folder);
         Ok(results)
+    }
+
+    /// Files of these names must not remain from an earlier run: those that the folder's [`MANIFEST`] lists are removed as the new files are
+    /// written.
+    #[must_use]
+    pub fn without(mut self, names: &[&str]) -> Self {
+        self.outdated = names.iter().map(|name| (*name).to_owned()).collect();
+        self
     }
 
     /// Starts a file that is written piece by piece.
@@ -96,7 +107,7 @@ impl ResultsFolder {
 
     /// Writes all files, or none; returns their paths.
     ///
-    /// Files of an earlier run, listed in the folder's [`MANIFEST`], are replaced. Any other file of the same name is kept,
+    /// Files of an earlier run, listed in the folder's [`MANIFEST`], are replaced, or removed ([`Self::without`]). Any other file of the same name is kept,
     /// and the call fails before a name is changed.
     ///
     /// # Errors
@@ -118,8 +129,16 @@ impl ResultsFolder {
                 return Err(FileError::Foreign { path });
             }
         }
-        let names = listed(&folder, &ours, &new);
-        let unfinished = format!("{UNFINISHED}\n{names}");
+        let outdated: Vec<&String> = (self.outdated.iter())
+            .filter(|name| ours.contains(name) && !new.contains(&name.as_str()))
+            .collect();
+        // Until they are removed, the list names them: a run that is stopped before can be repeated.
+        let unfinished = format!("{UNFINISHED}\n{}", listed(&folder, &ours, &new));
+        let remaining: Vec<String> = (ours.iter())
+            .filter(|name| !outdated.contains(name))
+            .cloned()
+            .collect();
+        let names = listed(&folder, &remaining, &new);
         let list = folder.join(MANIFEST);
         let stage = |path: &Path, bytes: &[u8]| {
             Staged::file(&folder, bytes).map_err(FileError::write(path))
@@ -144,6 +163,12 @@ impl ResultsFolder {
         place(first, &list)?;
         self.made.clear();
         durable()?;
+        for name in outdated {
+            let path = folder.join(name);
+            if is_there(&path) {
+                disk::remove_file(&path).map_err(FileError::write(&path))?;
+            }
+        }
         let mut written = Vec::new();
         for (staged, path) in staged {
             if path == list {

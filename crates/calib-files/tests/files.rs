@@ -30,6 +30,26 @@ fn results_replace_their_own_files_and_no_others() {
     assert!(matches!(error, FileError::SameName { .. }), "{error}");
 }
 
+/// What a run does not write any more does not remain, but for files that are not ours.
+#[test]
+fn files_of_an_earlier_run_that_must_not_remain_are_removed() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = |name: &str| folder.path().join(name);
+    let both = [
+        OutputFile::text("a.txt", "1"),
+        OutputFile::text("old.txt", "1"),
+    ];
+    write_results(folder.path(), &both).expect("an empty folder");
+    fs::write(at("mine.txt"), "mine").expect("mine.txt");
+    let results = ResultsFolder::open(folder.path()).expect("a folder");
+    let results = results.without(&["old.txt", "mine.txt", "never.txt", "a.txt"]);
+    let written = results.write(&both[..1]).expect("its own files");
+    assert!(written.contains(&at("a.txt")) && at("a.txt").exists());
+    assert!(!at("old.txt").exists());
+    assert_eq!(fs::read_to_string(at("mine.txt")).expect("kept"), "mine");
+    assert_eq!(fs::read_to_string(at(MANIFEST)).expect("list"), "a.txt\n");
+}
+
 #[test]
 fn new_files_do_not_overwrite() {
     let folder = tempfile::tempdir().expect("a folder");

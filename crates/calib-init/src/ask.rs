@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use calib_checks::structural::{Chain, Correction, Decision, Hypothesis, RecordingIndex, Scoped};
 use calib_urdf::{LinkId, RobotModel, doubt};
 
-use crate::bodies::Found;
 use crate::correct;
 use crate::error::InitError;
 use crate::fact::{About, CERTAIN, Fact, Mistake, Place, Residuals, Rival};
 use crate::links::{Assigned, Choice, Scene, is_of_links};
 use crate::robot;
 use crate::session::Draft;
+use crate::signs::{self, Signs};
 use crate::source::Source;
 
 /// Links for all bodies, with what the hypotheses say.
@@ -136,23 +136,41 @@ pub struct Next {
 /// # Errors
 /// [`InitError::Recording`] where a file cannot be read by its new map.
 pub fn next_correction(
-    model: &RobotModel,
+    scene: &Scene<'_>,
     sources: &[Source],
     drafts: &[Draft],
-    found: &[Found],
     assigned: &Assigned,
 ) -> Result<Next, InitError> {
+    let (model, found) = (scene.model, scene.bodies);
     let mut next = Next::default();
     let Some(outcome) = &assigned.outcome else {
         return Ok(next);
     };
+    let limit = outcome.expected.map(|e| e.limit);
+    let bodies: Vec<String> = assigned
+        .on
+        .iter()
+        .map(|(b, _)| found[*b].name.clone())
+        .collect();
+    let context = Context {
+        model,
+        sources,
+        drafts,
+        bodies: &bodies,
+    };
+    let signs = of_signs(scene, assigned);
+    if let Some((signs, left)) = &signs
+        && signs.is_better_than(*left)
+        && let Some(by_signs) = context.by_signs(signs, limit)?
+    {
+        return Ok(by_signs);
+    }
     let named = match &outcome.decision {
         Decision::Named(named) => named,
         Decision::Undecided { .. } => {
-            let limit = outcome.expected.map_or(0.0, |e| e.limit);
             let about = About::Disagrees {
                 rms: outcome.rms,
-                limit,
+                limit: limit.unwrap_or(0.0),
             };
             next.facts.push(Fact::new(Place::Recordings, about));
             return Ok(next);
@@ -173,24 +191,19 @@ pub fn next_correction(
         }
         _ => return Ok(next),
     };
-    let bodies: Vec<String> = assigned
-        .on
-        .iter()
-        .map(|(b, _)| found[*b].name.clone())
-        .collect();
     let residuals = Residuals {
         none: named.evidence.none,
         best: named.evidence.best,
         next: named.evidence.next,
+        over: limit.filter(|limit| named.evidence.best > *limit),
     };
     let all: Vec<&Correction> = std::iter::once(&named.correction)
         .chain(&named.equivalent)
         .collect();
-    let in_words = |correction: &Correction| -> Vec<Mistake> {
-        let source = drafts.first().map(|draft| &sources[draft.source]);
-        let of = |s: &Scoped| correct::mistake(model, source, &bodies, &s.hypothesis);
-        correction.iter().map(of).collect()
-    };
+    // Patterns of signs that leave about as much as a correction that leaves too much.
+    let as_good: Vec<Correction> = signs.map_or_else(Vec::new, |(signs, left)| signs.like(left));
+    let as_good = as_good.iter().filter(|c| !all.contains(c));
+    let as_good: Vec<Vec<Mistake>> = as_good.map(|c| context.in_words(c)).collect();
     // Of corrections that the recordings do not distinguish, one that a column map can hold.
     let mut first = None;
     let is_of_tables = |c: &Correction| c.iter().any(|s| !is_of_links(&s.hypothesis));
@@ -199,7 +212,8 @@ pub fn next_correction(
             continue;
         }
         let others = all.iter().enumerate().filter(|(k, _)| *k != i);
-        let others: Vec<Vec<Mistake>> = others.map(|(_, c)| in_words(c)).collect();
+        let others = others.map(|(_, c)| context.in_words(c));
+        let others: Vec<Vec<Mistake>> = others.chain(as_good.iter().cloned()).collect();
         let evidence = (residuals, others.as_slice());
         let all = apply_each(model, sources, drafts, &bodies, correction, evidence)?;
         if all.complete {
@@ -213,6 +227,64 @@ pub fn next_correction(
         next.sources = applied.sources;
     }
     Ok(next)
+}
+
+/// What is corrected.
+struct Context<'a> {
+    model: &'a RobotModel,
+    sources: &'a [Source],
+    drafts: &'a [Draft],
+    bodies: &'a [String],
+}
+
+impl Context<'_> {
+    fn in_words(&self, correction: &Correction) -> Vec<Mistake> {
+        let source = self.drafts.first().map(|d| &self.sources[d.source]);
+        let of = |s: &Scoped| correct::mistake(self.model, source, self.bodies, &s.hypothesis);
+        correction.iter().map(of).collect()
+    }
+
+    /// The best pattern of signs as the correction; `None` where no column map can hold it.
+    fn by_signs(&self, signs: &Signs, limit: Option<f64>) -> Result<Option<Next>, InitError> {
+        let residuals = Residuals {
+            none: signs.none,
+            best: signs.best.rms,
+            next: signs.next,
+            over: limit.filter(|limit| signs.best.rms > *limit),
+        };
+        let others = signs.others.iter().map(|p| self.in_words(&p.correction));
+        let others: Vec<Vec<Mistake>> = others.collect();
+        let applied = apply_each(
+            self.model,
+            self.sources,
+            self.drafts,
+            self.bodies,
+            &signs.best.correction,
+            (residuals, others.as_slice()),
+        )?;
+        Ok(applied.complete.then_some(Next {
+            facts: applied.facts,
+            sources: applied.sources,
+        }))
+    }
+}
+
+/// Patterns of signs, and what the explanation of the hypotheses leaves, where that is more than errors of a nominal robot explain and signs may be
+/// behind it.
+fn of_signs(scene: &Scene<'_>, assigned: &Assigned) -> Option<(Signs, f64)> {
+    let outcome = assigned.outcome.as_ref()?;
+    let (left, of_signs) = match &outcome.decision {
+        Decision::Undecided { leading: None, .. } => (outcome.rms, true),
+        Decision::Undecided {
+            leading: Some(named),
+            ..
+        }
+        | Decision::Named(named) => (named.evidence.best, signs::is_of_signs(&named.correction)),
+        _ => return None,
+    };
+    let too_much = outcome.expected.is_some_and(|e| left > e.limit);
+    let signs = signs::search(scene, assigned).filter(|_| of_signs && too_much)?;
+    Some((signs, left))
 }
 
 /// Corrections applied one after the other.

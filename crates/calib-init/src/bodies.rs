@@ -32,9 +32,9 @@ const CALCULATED: f64 = 1.5e-6;
 /// Positions of a marker in the rows that are looked at.
 type Track = Vec<Option<Point3<f64>>>;
 
-/// The bodies of all files together, with the noise that their markers show.
+/// The bodies of all files together, with the noise that their markers show. Bodies of markers have names that no link of the robot has.
 #[must_use]
-pub fn bodies(sources: &[Source]) -> (Vec<Found>, Vec<Fact>) {
+pub fn bodies(model: &RobotModel, sources: &[Source]) -> (Vec<Found>, Vec<Fact>) {
     let mut facts = Vec::new();
     let mut tracks = tracks(sources);
     facts.extend(seldom(&mut tracks));
@@ -53,7 +53,7 @@ pub fn bodies(sources: &[Source]) -> (Vec<Found>, Vec<Fact>) {
     {
         let mut markers: Vec<String> = group.iter().map(|m| names[*m].clone()).collect();
         let of_group: Vec<&[Option<Point3<f64>>]> = group.iter().map(|m| slices[*m]).collect();
-        let name = body_name(&markers, &mut taken);
+        let name = free(unlike_links(model, body_name(&markers)), &mut taken);
         let place = Place::Body(name.clone());
         let about = if markers.len() < 3 {
             About::Points {
@@ -190,7 +190,7 @@ fn seen_together(group: &[usize], tracks: &[&[Option<Point3<f64>>]]) -> Vec<Vec<
 }
 
 /// What the names of the markers have in common, if that is a name.
-fn body_name(markers: &[String], taken: &mut BTreeSet<String>) -> String {
+fn body_name(markers: &[String]) -> String {
     let first = markers.first().map_or("", String::as_str);
     let common = markers.iter().fold(first, |common, name| {
         let same = common.chars().zip(name.chars()).take_while(|(a, b)| a == b);
@@ -206,8 +206,15 @@ fn body_name(markers: &[String], taken: &mut BTreeSet<String>) -> String {
         .rsplit(':')
         .map(|part| part.trim_end_matches(|c: char| !c.is_alphanumeric()));
     let base = parts.find(|part| part.chars().count() >= 2);
-    let base = base.unwrap_or("body").to_owned();
-    free(base, taken)
+    base.unwrap_or("body").to_owned()
+}
+
+/// A name for a body that no link of the robot has: `calib predict` and others ask for both by one name.
+pub(crate) fn unlike_links(model: &RobotModel, mut name: String) -> String {
+    while model.link_id(&name).is_ok() {
+        name += "_markers";
+    }
+    name
 }
 
 fn free(base: String, taken: &mut BTreeSet<String>) -> String {
@@ -219,7 +226,12 @@ fn free(base: String, taken: &mut BTreeSet<String>) -> String {
 
 /// Bodies whose two markers are not one after all, as a body for each marker.
 #[must_use]
-pub fn split(found: Vec<Found>, facts: &mut Vec<Fact>, apart: &[usize]) -> Vec<Found> {
+pub fn split(
+    model: &RobotModel,
+    found: Vec<Found>,
+    facts: &mut Vec<Fact>,
+    apart: &[usize],
+) -> Vec<Found> {
     let mut taken: BTreeSet<String> = found.iter().map(|body| body.name.clone()).collect();
     let mut new = Vec::new();
     for (i, body) in found.into_iter().enumerate() {
@@ -229,7 +241,7 @@ pub fn split(found: Vec<Found>, facts: &mut Vec<Fact>, apart: &[usize]) -> Vec<F
         }
         facts.retain(|fact| fact.place != Place::Body(body.name.clone()));
         for marker in body.markers {
-            let name = free(marker.clone(), &mut taken);
+            let name = free(unlike_links(model, marker.clone()), &mut taken);
             let about = About::Points { markers: 1 };
             facts.push(Fact::new(Place::Body(name.clone()), about));
             new.push(Found {
@@ -315,7 +327,7 @@ mod tests {
         let mut taken = BTreeSet::new();
         let named = |markers: &[&str], taken: &mut BTreeSet<String>| {
             let markers: Vec<String> = markers.iter().map(|m| (*m).to_owned()).collect();
-            body_name(&markers, taken)
+            free(body_name(&markers), taken)
         };
         assert_eq!(named(&["gripM_1", "gripM_2"], &mut taken), "gripM");
         assert_eq!(named(&["m1", "m2", "m3"], &mut taken), "body");

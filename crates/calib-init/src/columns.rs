@@ -39,7 +39,13 @@ pub fn guess(model: &RobotModel, header: &Header) -> Guess {
     guess.map.decimal_comma = header.decimal_comma;
     let mut used: BTreeSet<usize> = BTreeSet::new();
     time(header, &mut guess, &mut used);
-    tracked(header, &mut guess, &mut used);
+    let (stated, named) = like_coordinates(model, header);
+    // The columns `x`, `y` and `z` are a marker where the table has no other.
+    let both: BTreeSet<usize> = stated.union(&named).copied().collect();
+    tracked(header, &mut guess, &mut used, &both);
+    if guess.map.markers.is_empty() && guess.map.bodies.is_empty() {
+        tracked(header, &mut guess, &mut used, &stated);
+    }
     joints(model, header, &mut guess, &mut used);
     angles(model, header, &mut guess);
     lengths(model, header, &mut guess);
@@ -114,10 +120,36 @@ fn unit_of_time(column: &[Option<f64>]) -> TimeUnit {
 /// Columns of one thing: what stands around the letter → the columns by letter.
 type Groups = BTreeMap<(String, String), [Option<usize>; 4]>;
 
-/// Columns in threes (x, y, z) and in fours (a quaternion).
-fn tracked(header: &Header, guess: &mut Guess, used: &mut BTreeSet<usize>) {
+/// What stands before the name of a joint that would read as something else.
+const JOINT: &str = "joint:";
+
+/// The name of a joint's column without its unit and without [`JOINT`].
+fn stem_of(column: &str) -> &str {
+    let stem = name::unit(column).stem;
+    stem.strip_prefix(JOINT).unwrap_or(stem)
+}
+
+/// Columns with the names of joints that are called like coordinates: those with [`JOINT`] before them, and the others.
+fn like_coordinates(model: &RobotModel, header: &Header) -> (BTreeSet<usize>, BTreeSet<usize>) {
+    let of_joint = |i: &usize| {
+        let column = &header.names[*i];
+        let mut joints = model.independent_joints();
+        joints.any(|j| model.joint(j).name == stem_of(column) && fits(model, j, column))
+    };
+    let all = (0..header.names.len()).filter(of_joint);
+    all.partition(|i| header.names[*i].starts_with(JOINT))
+}
+
+/// Columns in threes (x, y, z) and in fours (a quaternion), but for those of joints.
+fn tracked(
+    header: &Header,
+    guess: &mut Guess,
+    used: &mut BTreeSet<usize>,
+    joints: &BTreeSet<usize>,
+) {
     let (mut places, mut turns) = (Groups::new(), Groups::new());
-    for i in (0..header.names.len()).filter(|i| !used.contains(i) && header.has_numbers(*i)) {
+    let free = |i: &usize| !used.contains(i) && !joints.contains(i) && header.has_numbers(*i);
+    for i in (0..header.names.len()).filter(free) {
         let unit = name::unit(&header.names[i]);
         if matches!(unit.unit, Some(NamedUnit::Angle(_) | NamedUnit::Time(_))) {
             continue;
@@ -169,7 +201,7 @@ fn tracked(header: &Header, guess: &mut Guess, used: &mut BTreeSet<usize>) {
 fn joints(model: &RobotModel, header: &Header, guess: &mut Guess, used: &mut BTreeSet<usize>) {
     let free = |used: &BTreeSet<usize>, i: &usize| !used.contains(i) && header.has_numbers(*i);
     let mut found: BTreeMap<JointId, usize> = BTreeMap::new();
-    let stem = |i: usize| name::unit(&header.names[i]).stem;
+    let stem = |i: usize| stem_of(&header.names[i]);
     for joint in model.independent_joints() {
         let wanted = &model.joint(joint).name;
         let columns = (0..header.names.len()).filter(|i| free(used, i));

@@ -143,6 +143,8 @@ pub struct Residuals {
     pub best: f64,
     /// After the best other correction.
     pub next: Option<f64>,
+    /// What errors of a nominal robot explain, where more is left.
+    pub over: Option<f64>,
 }
 
 /// Another link, and how much worse it explains a body's motion.
@@ -165,6 +167,8 @@ pub enum About {
         moving: usize,
         /// Those of them without position limits.
         unlimited: Vec<String>,
+        /// Those of them whose lower limit is above the upper one.
+        reversed: Vec<String>,
         /// Those of them that turn without end.
         endless: Vec<String>,
         /// Those of them whose limits leave no range.
@@ -379,6 +383,20 @@ pub enum About {
         /// After the corrections that stand beside it.
         corrected: bool,
     },
+    /// A number stands for lost samples of markers.
+    LostByNumber {
+        /// The number, m.
+        value: f64,
+        /// Its samples.
+        samples: usize,
+    },
+    /// The clocks are further apart than a profile looks for by itself.
+    FarClocks {
+        /// Tracker's clock from the robot's, s.
+        offset: f64,
+        /// How far the profile looks for it, s.
+        searched: f64,
+    },
     /// Too few poses to test order, signs and units.
     TooFew {
         /// Poses.
@@ -434,10 +452,14 @@ fn is_guess(about: &About) -> bool {
     match about {
         About::Joints {
             unlimited,
+            reversed,
             no_range,
             in_degrees,
             ..
-        } => !(unlimited.is_empty() && no_range.is_empty() && in_degrees.is_empty()),
+        } => {
+            let unusual = [unlimited, reversed, no_range, in_degrees];
+            unusual.iter().any(|names| !names.is_empty())
+        }
         About::LinkStated { better, .. } => better.is_some(),
         About::Link {
             rms, next, same, ..
@@ -453,6 +475,8 @@ fn is_guess(about: &About) -> bool {
         | About::JointsByOrder { .. }
         | About::JointsMissing { .. }
         | About::Duplicate { .. }
+        | About::LostByNumber { .. }
+        | About::FarClocks { .. }
         | About::Seldom { .. }
         | About::Flat { .. }
         | About::ValidationSmallest { .. }

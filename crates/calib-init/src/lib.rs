@@ -16,6 +16,7 @@ pub mod proposal;
 mod propose;
 pub mod robot;
 pub mod session;
+pub mod signs;
 pub mod skeleton;
 pub mod source;
 pub mod tables;

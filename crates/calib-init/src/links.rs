@@ -134,6 +134,18 @@ impl Scene<'_> {
         found
     }
 
+    /// The ends of the chains: the last links that recorded joints move.
+    #[must_use]
+    pub fn recorded_tips(&self) -> Vec<LinkId> {
+        let recorded = self.recorded();
+        let of = |tip: robot::Tip| {
+            let mut joints = tip.joints.into_iter().rev();
+            let last = joints.find(|j| recorded.contains(j))?;
+            Some(robot::group(self.model, self.model.joint(last).child))
+        };
+        robot::tips(self.model).into_iter().filter_map(of).collect()
+    }
+
     /// The link of a body; `None` where no row shows it with joints.
     #[must_use]
     pub fn choose(&self, chain: &Chain, body: usize) -> Option<Choice> {
@@ -200,6 +212,7 @@ impl Scene<'_> {
                 none,
                 best: after,
                 next: None,
+                over: None,
             };
             if gain > OTHER_UNIT.ln() && best.as_ref().is_none_or(|b| gain > b.0) {
                 best = Some((gain, scoped, residuals));
@@ -315,21 +328,7 @@ impl Scene<'_> {
         if best.settled() {
             return best;
         }
-        let recorded = self.recorded();
-        let tips: Vec<LinkId> = robot::tips(self.model)
-            .into_iter()
-            .filter_map(|tip| {
-                // The last link that recorded joints move.
-                let joints: Vec<JointId> = tip
-                    .joints
-                    .into_iter()
-                    .filter(|j| recorded.contains(j))
-                    .collect();
-                joints
-                    .last()
-                    .map(|j| robot::group(self.model, self.model.joint(*j).child))
-            })
-            .collect();
+        let tips = self.recorded_tips();
         for (at, (body, _)) in own.iter().enumerate() {
             if stated.iter().any(|(b, _)| b == body) {
                 continue;

@@ -39,6 +39,8 @@ pub struct Recording {
     pub log: Option<Table>,
     /// `None`: every row is a pose.
     pub stream: Option<Stream>,
+    /// Largest offset between the clocks that is looked for, s, where the usual one is too small.
+    pub max_offset: Option<f64>,
     /// What it is for.
     pub usage: Use,
     /// Joints without a column, which are taken to stand at 0.

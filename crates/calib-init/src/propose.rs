@@ -113,47 +113,12 @@ fn robot_name(model: &RobotModel, request: &Request) -> String {
 }
 
 fn of_robot(model: &RobotModel) -> Vec<Fact> {
-    let mut facts = vec![joints(model)];
+    let mut facts = vec![Fact::new(Place::Robot, robot::joints(model))];
     let reach = doubt::reach(model);
     if reach > doubt::LARGEST {
         facts.push(Fact::new(Place::Robot, About::TooLarge { reach }));
     }
     facts
-}
-
-fn joints(model: &RobotModel) -> Fact {
-    let moving: Vec<JointId> = model.independent_joints().collect();
-    let unlimited = moving.iter().filter(|j| {
-        let joint = model.joint(**j);
-        // A joint that turns without end says so.
-        doubt::range(joint).is_none()
-            && !matches!(joint.kind, calib_urdf::JointKind::Continuous { .. })
-    });
-    let unlimited: Vec<JointId> = unlimited.copied().collect();
-    let endless = |j: &JointId| {
-        matches!(
-            model.joint(*j).kind,
-            calib_urdf::JointKind::Continuous { .. }
-        )
-    };
-    let endless: Vec<JointId> = moving.iter().copied().filter(endless).collect();
-    let no_range = moving
-        .iter()
-        .copied()
-        .filter(|j| robot::has_no_range(model, *j));
-    let no_range: Vec<JointId> = no_range.collect();
-    let names = |joints: &[JointId]| {
-        let names = robot::names(model, joints).into_iter();
-        names.map(str::to_owned).collect()
-    };
-    let about = About::Joints {
-        moving: moving.len(),
-        unlimited: names(&unlimited),
-        endless: names(&endless),
-        no_range: names(&no_range),
-        in_degrees: names(&doubt::limits_in_degrees(model)),
-    };
-    Fact::new(Place::Robot, about)
 }
 
 /// Names of the ends of all chains.
@@ -170,7 +135,7 @@ fn without_recordings(
     longest: &robot::Tip,
     proposal: &mut Proposal,
 ) -> Result<(), InitError> {
-    const BODY: &str = "tool";
+    let body = bodies::unlike_links(model, "tool".to_owned());
     let link = stated.unwrap_or(longest.link);
     let named = |link: LinkId| model.link(link).name.clone();
     let about = match stated {
@@ -191,7 +156,7 @@ fn without_recordings(
     };
     proposal
         .facts
-        .push(Fact::new(Place::Body(BODY.to_owned()), about));
+        .push(Fact::new(Place::Body(body.clone()), about));
     let joints = robot::movers(model, link);
     if joints.is_empty() {
         return Err(InitError::StillLink {
@@ -208,8 +173,8 @@ fn without_recordings(
         });
     }
     proposal.bodies.push(Body {
-        name: BODY.to_owned(),
-        markers: (1..=4).map(|i| format!("{BODY}_{i}")).collect(),
+        markers: (1..=4).map(|i| format!("{body}_{i}")).collect(),
+        name: body,
         link,
     });
     // A robot that only slides has no axis to sweep.
@@ -224,6 +189,7 @@ fn without_recordings(
             },
             log: None,
             stream: None,
+            max_offset: None,
             usage,
             hold: Vec::new(),
         });
@@ -258,7 +224,7 @@ fn with_recordings(
     let read = files.iter().map(|file| Source::read(model, file));
     let mut sources: Vec<Source> = read.collect::<Result<_, _>>()?;
     let (mut drafts, mut of_files) = session::drafts(model, &sources)?;
-    let (mut found, mut of_bodies) = bodies::bodies(&sources);
+    let (mut found, mut of_bodies) = bodies::bodies(model, &sources);
     if found.is_empty() {
         return Err(InitError::NothingSeen {
             files: sources.iter().map(|s| s.file.shown.clone()).collect(),
@@ -267,6 +233,8 @@ fn with_recordings(
     bodies::without_left_out(model, &mut sources, &of_bodies)?;
     let start = stated.unwrap_or_else(|| last_recorded(model, &sources).unwrap_or(longest.link));
     proposal.bodies = on_link(&found, start);
+    proposal.recordings = recordings(&drafts, &sources);
+    of_files.extend(tables::far_clocks(model, proposal, &mut drafts, &sources)?);
     proposal.recordings = recordings(&drafts, &sources);
     let mut poses = tables::tables(model, proposal, &drafts, &sources)?;
     if stated.is_none() && poses.iter().all(|p| session::moved(model, p).is_empty()) {
@@ -287,7 +255,7 @@ fn with_recordings(
         corrections.push(fact);
         if let Some(new) = new {
             sources = new;
-            (found, of_bodies) = bodies::bodies(&sources);
+            (found, of_bodies) = bodies::bodies(model, &sources);
             proposal.recordings = recordings(&drafts, &sources);
             poses = tables::tables(model, proposal, &drafts, &sources)?;
         }
@@ -298,7 +266,7 @@ fn with_recordings(
         tables: &poses,
     };
     let apart = scene.not_rigid();
-    found = bodies::split(found, &mut of_bodies, &apart);
+    found = bodies::split(model, found, &mut of_bodies, &apart);
     proposal.bodies = on_link(&found, start);
     let mut of_links = Vec::new();
     for _ in 0..=CORRECTIONS {
@@ -312,7 +280,7 @@ fn with_recordings(
             proposal.bodies[*body].link = *link;
         }
         of_links = asked.facts(&scene, stated);
-        let next = next_correction(model, &sources, &drafts, &found, &asked.assigned)?;
+        let next = next_correction(&scene, &sources, &drafts, &asked.assigned)?;
         corrections.extend(next.facts);
         let Some(new) = next.sources.filter(|_| corrections.len() <= CORRECTIONS) else {
             break;
@@ -427,6 +395,7 @@ fn recordings(drafts: &[Draft], sources: &[Source]) -> Vec<Recording> {
         table: table(draft.source),
         log: draft.log.map(table),
         stream: draft.stream,
+        max_offset: draft.max_offset,
         usage: draft.usage.clone(),
         hold: Vec::new(),
     };

@@ -1,6 +1,10 @@
 //! What the URDF alone says: which links move together, where chains end, and how far the robot reaches.
 
-use calib_urdf::{JointId, JointKind, LinkId, RobotModel};
+use std::collections::BTreeSet;
+
+use calib_urdf::{JointId, JointKind, LinkId, Problem, RobotModel, doubt};
+
+use crate::fact::About;
 
 /// The link at the root side of all fixed joints above a link: links with the same one move together.
 #[must_use]
@@ -39,12 +43,10 @@ pub fn movers(model: &RobotModel, link: LinkId) -> Vec<JointId> {
     found
 }
 
-/// Whether the limits of a joint leave it no range; a joint that turns without end has one.
+/// Whether the limits of a joint and of those that follow it leave it no range; a joint that turns without end has one.
 #[must_use]
 pub fn has_no_range(model: &RobotModel, joint: JointId) -> bool {
-    let joint = model.joint(joint);
-    let endless = matches!(joint.kind, JointKind::Continuous { .. });
-    !endless && joint.limits.range().is_some_and(|(low, high)| high <= low)
+    calib_urdf::range::range(model, joint).is_some_and(|(low, high)| high <= low)
 }
 
 /// The end of a chain: a link that moves and carries no other moving link.
@@ -113,4 +115,37 @@ pub fn links_of_group(model: &RobotModel, link: LinkId) -> Vec<LinkId> {
 pub fn names<'m>(model: &'m RobotModel, joints: &[JointId]) -> Vec<&'m str> {
     let names = joints.iter().map(|j| model.joint(*j).name.as_str());
     names.collect()
+}
+
+/// What is said of the joints and their limits.
+#[must_use]
+pub fn joints(model: &RobotModel) -> About {
+    let moving: Vec<JointId> = model.independent_joints().collect();
+    let named = |wanted: &dyn Fn(&JointId) -> bool| -> Vec<String> {
+        let of = moving.iter().copied().filter(wanted);
+        let of: Vec<JointId> = of.collect();
+        let names = names(model, &of).into_iter();
+        names.map(str::to_owned).collect()
+    };
+    let warnings = model.warnings().iter();
+    let reversed: BTreeSet<&str> = warnings
+        .filter_map(|found| match &found.problem {
+            Problem::LimitsReversed { joint, .. } => Some(joint.as_str()),
+            _ => None,
+        })
+        .collect();
+    let name = |j: &JointId| model.joint(*j).name.as_str();
+    let endless = |j: &JointId| matches!(model.joint(*j).kind, JointKind::Continuous { .. });
+    let in_degrees = doubt::limits_in_degrees(model);
+    About::Joints {
+        moving: moving.len(),
+        // A joint that turns without end says so.
+        unlimited: named(&|j| {
+            doubt::range(model.joint(*j)).is_none() && !endless(j) && !reversed.contains(name(j))
+        }),
+        reversed: named(&|j| reversed.contains(name(j))),
+        endless: named(&endless),
+        no_range: named(&|j| has_no_range(model, *j)),
+        in_degrees: named(&|j| in_degrees.contains(j)),
+    }
 }

@@ -42,6 +42,8 @@ pub struct Draft {
     pub log: Option<usize>,
     /// `None`: every row is a pose.
     pub stream: Option<Stream>,
+    /// Largest offset between the clocks that is looked for, s, where the usual one is too small.
+    pub max_offset: Option<f64>,
     /// What it is for.
     pub usage: Use,
 }
@@ -136,6 +138,7 @@ pub fn drafts(
             source: i,
             log,
             stream: stream.map(|s| s.0),
+            max_offset: None,
             usage: Use::Static,
         });
     }

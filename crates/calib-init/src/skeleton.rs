@@ -41,11 +41,12 @@ pub fn skeleton(model: &RobotModel, joints: &[JointId]) -> Skeleton {
     Skeleton { sweep, random }
 }
 
-/// The middle of a joint's limits, at most [`WIDEST`] to either side.
+/// The middle of a joint's limits and of those of the joints that follow it, at most [`WIDEST`] to either side.
 fn range(model: &RobotModel, joint: JointId) -> (f64, f64) {
     let in_degrees = doubt::limits_in_degrees(model).contains(&joint);
+    let allowed = calib_urdf::range::range(model, joint);
     let joint = model.joint(joint);
-    let (low, high) = match (doubt::range(joint), joint.kind.turns()) {
+    let (low, high) = match (allowed, joint.kind.turns()) {
         (Some((low, high)), true) if in_degrees => (low.to_radians(), high.to_radians()),
         (Some(range), _) => range,
         (None, true) => (-WIDEST, WIDEST),

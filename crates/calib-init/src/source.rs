@@ -1,5 +1,8 @@
 //! A file that was given: its bytes, its column map where it needs one, and what the reader makes of it.
 
+use std::collections::BTreeMap;
+
+use calib_finding::{Fact, catalog};
 use calib_recording::{ColumnMap, ReadOptions, Recording, read_bytes};
 use calib_urdf::RobotModel;
 
@@ -81,6 +84,9 @@ impl Source {
             names = table.names;
         }
         recording.joints.retain(|s| model.joint_id(&s.name).is_ok());
+        let mut facts = facts;
+        facts.retain(|about| !matches!(about, About::LostByNumber { .. }));
+        facts.extend(lost_by_number(&recording));
         Self {
             file: file.clone(),
             columns,
@@ -129,6 +135,22 @@ impl Source {
             .unwrap_or_default();
         name.split_once('.').map_or(name, |(stem, _)| stem)
     }
+}
+
+/// Numbers that the reader took for lost samples because they repeat.
+fn lost_by_number(recording: &Recording) -> Vec<About> {
+    let mut samples: BTreeMap<u64, usize> = BTreeMap::new();
+    let findings = recording.meta.findings.iter();
+    for finding in findings.filter(|f| f.id == catalog::PLACEHOLDER_TRIPLET) {
+        if let Some(value) = finding.facts.get("value").and_then(Fact::value) {
+            *samples.entry(value.to_bits()).or_default() += finding.rows.len();
+        }
+    }
+    let of = |(value, samples)| About::LostByNumber {
+        value: f64::from_bits(value),
+        samples,
+    };
+    samples.into_iter().map(of).collect()
 }
 
 fn mapped(file: &File, map: &ColumnMap) -> Result<Recording, InitError> {

@@ -4,13 +4,19 @@ use std::path::PathBuf;
 
 use calib_pipeline::error::{DataProblem, PipelineError};
 use calib_pipeline::prepare::align::align;
+use calib_pipeline::prepare::aligned::ClockState;
 use calib_pipeline::prepare::inputs::{RobotProfile, Written};
 use calib_pipeline::prepare::loads::Masses;
-use calib_pipeline::prepare::timelines::{with_robot_log, with_robot_rows};
-use calib_recording::{Filled, Poses};
+use calib_pipeline::prepare::streams::Scalars;
+use calib_pipeline::prepare::timelines::{
+    overlapping_offsets, tracker_timeline, with_robot_log, with_robot_rows,
+};
+use calib_profile::Timing;
+use calib_recording::{Filled, Poses, Recording};
 use calib_urdf::RobotModel;
 
 use crate::error::InitError;
+use crate::fact::{About, Fact, Place};
 use crate::proposal::Proposal;
 use crate::session::Draft;
 use crate::source::Source;
@@ -40,6 +46,24 @@ pub fn robot_profile(model: &RobotModel, proposal: &Proposal) -> Result<RobotPro
     })
 }
 
+/// A recording as its files say it, those of the robot's own log among them.
+fn recording_of(draft: &Draft, sources: &[Source]) -> Result<Recording, InitError> {
+    let source = &sources[draft.source];
+    let recording = source.recording.clone();
+    let Some(log) = draft.log else {
+        return Ok(recording);
+    };
+    let log = sources[log].recording.clone();
+    match draft.stream {
+        Some(_) => Ok(with_robot_log(recording, log)),
+        None => with_robot_rows(recording, log).map_err(|e| {
+            let problem = Box::new(DataProblem::RowsDiffer(e));
+            let file = source.file.shown.clone();
+            PipelineError::Data { file, problem }.into()
+        }),
+    }
+}
+
 /// One table for each recording.
 ///
 /// # Errors
@@ -53,17 +77,7 @@ pub fn tables(
     let robot = robot_profile(model, proposal)?;
     let of = |draft: &Draft| -> Result<Poses, InitError> {
         let source = &sources[draft.source];
-        let mut recording = source.recording.clone();
-        if let Some(log) = draft.log {
-            let log = sources[log].recording.clone();
-            recording = match draft.stream {
-                Some(_) => with_robot_log(recording, log),
-                None => with_robot_rows(recording, log).map_err(|e| PipelineError::Data {
-                    file: source.file.shown.clone(),
-                    problem: Box::new(DataProblem::RowsDiffer(e)),
-                })?,
-            };
-        }
+        let recording = recording_of(draft, sources)?;
         let spec = &robot.profile.recordings[&draft.name];
         match &spec.timing {
             None => {
@@ -77,4 +91,53 @@ pub fn tables(
         }
     };
     drafts.iter().map(of).collect()
+}
+
+/// Looks for the offset of clocks that are further apart than a profile looks for by itself, and notes for each such draft how far to look.
+///
+/// # Errors
+/// As [`tables`].
+pub fn far_clocks(
+    model: &RobotModel,
+    proposal: &Proposal,
+    drafts: &mut [Draft],
+    sources: &[Source],
+) -> Result<Vec<Fact>, InitError> {
+    /// Looked for beyond the offset that was found, s.
+    const ROOM: f64 = 10.0;
+    let robot = robot_profile(model, proposal)?;
+    let mut facts = Vec::new();
+    for draft in drafts {
+        let recording = recording_of(draft, sources)?;
+        let spec = &robot.profile.recordings[&draft.name];
+        let Some(timing) = &spec.timing else { continue };
+        let try_it = |timing: &Timing| align(&robot, &draft.name, spec, timing, &recording);
+        let Err(PipelineError::Data { problem, .. }) = try_it(timing) else {
+            continue;
+        };
+        let lines = &recording.timelines;
+        let tracker = tracker_timeline(&recording).and_then(|line| lines[line].t.clone());
+        let joints = Scalars::of_joints(&recording);
+        let range = tracker.and_then(|t| overlapping_offsets(&t, &joints));
+        let (DataProblem::Clocks { .. }, Some((least, most))) = (*problem, range) else {
+            continue;
+        };
+        let wide = Timing {
+            max_offset: least.abs().max(most.abs()) + ROOM,
+            ..*timing
+        };
+        // What says no of all offsets is said by the usual ones.
+        let Ok(aligned) = try_it(&wide) else { continue };
+        if let ClockState::Found { map, .. } = aligned.alignment.clocks {
+            let most = (map.offset.abs() + ROOM).ceil();
+            draft.max_offset = Some(most);
+            let place = Place::Recording(draft.name.clone());
+            let about = About::FarClocks {
+                offset: map.offset,
+                searched: most,
+            };
+            facts.push(Fact::new(place, about));
+        }
+    }
+    Ok(facts)
 }

@@ -1,5 +1,7 @@
 //! Every sentence of a proposal: in the profile's comments and on the terminal.
 
+mod joints;
+
 use calib_finding::{Unit, number};
 use calib_recording::{AngleUnit, TimeUnit};
 
@@ -119,53 +121,9 @@ pub fn sentence(about: &About) -> String {
     }
 }
 
-fn of_joints(
-    moving: usize,
-    unlimited: &[String],
-    endless: &[String],
-    no_range: &[String],
-    in_degrees: &[String],
-) -> String {
-    let joints = plural(moving, "moving joint", "moving joints");
-    let turn = |names: &[String]| if names.len() == 1 { "turns" } else { "turn" };
-    if unlimited.is_empty() && no_range.is_empty() && in_degrees.is_empty() {
-        return match endless {
-            [] => format!("The URDF has {joints}, all with limits."),
-            _ => format!(
-                "The URDF has {joints}; {} {} without limits.",
-                quoted(endless),
-                turn(endless)
-            ),
-        };
-    }
-    let mut text = format!("The URDF has {joints}.");
-    if !unlimited.is_empty() {
-        text += &format!(" No limits are given for {}.", quoted(unlimited));
-    }
-    if !no_range.is_empty() {
-        text += &format!(
-            " The limits of {} leave no range (`lower` is `upper`): correct them in the URDF, or no planned posture moves them.",
-            quoted(no_range)
-        );
-    }
-    if !in_degrees.is_empty() {
-        text += &format!(
-            " The limits of {} are more than two turns: probably degrees, where a URDF has radians. Correct them in the URDF; the ranges proposed here take them as degrees.",
-            quoted(in_degrees)
-        );
-    }
-    text
-}
-
 fn of_links(about: &About) -> String {
     match about {
-        About::Joints {
-            moving,
-            unlimited,
-            endless,
-            no_range,
-            in_degrees,
-        } => of_joints(*moving, unlimited, endless, no_range, in_degrees),
+        About::Joints { .. } => joints::sentences(about),
         About::TooLarge { reach } => format!(
             "The robot of this URDF reaches {} m: probably its lengths are in millimeters, where a URDF has meters. Divide its origins, the limits of prismatic joints and the meshes by 1000 before anything else.",
             number::fixed(*reach, 0)
@@ -344,6 +302,15 @@ fn of_session(about: &About) -> String {
             plural(*rows, "pose", "poses")
         ),
         About::LeftOutInTurn => "No recording is held out: the report leaves every pose out in turn. Separate poses, recorded on another day, tell more.".to_owned(),
+        About::LostByNumber { value, samples } => format!(
+            "{} have {} in every coordinate, far from the others: taken as lost.",
+            plural(*samples, "sample", "samples"),
+            mm(*value)
+        ),
+        About::FarClocks { offset, searched } => format!(
+            "The tracker's clock is {} s ahead of the robot's, by the motion of the robot: `max_offset_s` lets a run look for it up to {searched:.0} s.",
+            number::fixed(*offset, 1)
+        ),
         About::Holds { holds } => format!("A stream in which the robot holds {}: each gives one pose.", plural(*holds, "time", "times")),
         About::Continuous => "A stream of a motion: rows are taken from it.".to_owned(),
         About::Log { file, named, rows } => {
@@ -447,8 +414,14 @@ fn corrected(mistake: &Mistake, residuals: &Residuals, equivalent: &[Vec<Mistake
             others.join(" Or: ")
         ),
     };
+    let doubt = residuals.over.map_or_else(String::new, |limit| {
+        format!(
+            " This is not certain: errors of 1° and 10 mm explain {} only, so that another mistake may be behind it.",
+            mm(limit)
+        )
+    });
     format!(
-        "{} Corrected here ({}).{others}",
+        "{} Corrected here ({}).{doubt}{others}",
         found(mistake),
         improvement(residuals)
     )

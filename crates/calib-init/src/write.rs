@@ -162,9 +162,15 @@ impl Page<'_> {
                 self.line("      rows: same");
             }
         }
+        let far = recording
+            .max_offset
+            .map(|s| format!(", max_offset_s: {s:.0}"));
+        let far = far.unwrap_or_default();
         match recording.stream {
-            Some(Stream::Settle) => self.line("    timing: {poses: settle}"),
-            Some(Stream::Continuous) => self.line("    timing: {poses: continuous}"),
+            Some(Stream::Settle) => self.line(&format!("    timing: {{poses: settle{far}}}")),
+            Some(Stream::Continuous) => {
+                self.line(&format!("    timing: {{poses: continuous{far}}}"));
+            }
             None => {}
         }
     }

@@ -84,11 +84,7 @@ pub fn compose(prepared: &Prepared<'_>, poses: usize) -> Result<Plan, PlanError>
     }
     let blocked = with_detours(prepared, &mut list);
     if !blocked.is_empty() {
-        let before = |place: &usize| {
-            let before = list[..*place].iter();
-            before.filter(|(_, why, _)| *why != Why::Detour).count()
-        };
-        let to = blocked.iter().map(before).collect();
+        let to = blocked.clone();
         notes.push(Note::NoClearMotion { to });
     }
     let as_recorded: Vec<Candidate> = list

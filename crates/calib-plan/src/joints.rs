@@ -1,7 +1,8 @@
 //! The joint box: what moves, how far, how fast; postures that fill it.
 
 use calib_profile::PlanSpec;
-use calib_urdf::{JointId, JointKind, RobotModel, doubt};
+use calib_urdf::range::{narrowed, range, resting_positions};
+use calib_urdf::{JointId, JointKind, LinkId, RobotModel};
 
 /// A joint that planned postures move.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,6 +28,8 @@ pub struct JointBox {
     pub base: Vec<f64>,
     /// Joints that carry a body and whose limits leave no range: they stand there.
     pub fixed: Vec<JointId>,
+    /// Joints whose stated range is wider than the limits of a joint that follows them allow.
+    pub narrowed: Vec<JointId>,
 }
 
 /// Planned positions are whole hundredths of a degree and hundredths of a millimeter: a list that a person can type.
@@ -35,8 +38,9 @@ const STEP_RAD: f64 = std::f64::consts::PI / 18000.0;
 const STEP_M: f64 = 1e-5;
 
 impl JointBox {
-    /// Of the joints that move a body: the profile's ranges, else the URDF's limits, else ±180°. Joints of `still` stand at the
-    /// position given there unless the profile gives a range. `Err`: a joint that slides without limits.
+    /// Of the joints that move a body: the profile's ranges, else the URDF's limits, else ±180°, within the limits of the joints that follow
+    /// them. Joints of `still` stand at the position given there unless the profile gives a range, others as near to 0 as their limits allow.
+    /// `Err`: a joint that slides without limits.
     ///
     /// # Errors
     /// The joint that has no range.
@@ -46,14 +50,14 @@ impl JointBox {
         used: &[JointId],
         still: &[(JointId, f64)],
     ) -> Result<Self, JointId> {
-        let mut base = model.zero_positions();
+        let mut base = resting_positions(model);
         for (joint, value) in still {
             base[joint.index()] = *value;
         }
         for (joint, value) in &spec.hold {
             base[joint.index()] = *value;
         }
-        let (mut moved, mut fixed) = (Vec::new(), Vec::new());
+        let (mut moved, mut fixed, mut by_followers) = (Vec::new(), Vec::new(), Vec::new());
         for id in model.independent_joints() {
             let joint = model.joint(id);
             let stated = spec.joints.get(&id).copied();
@@ -62,10 +66,15 @@ impl JointBox {
                 continue;
             }
             let turns = joint.kind.turns();
-            let endless = matches!(joint.kind, JointKind::Continuous { .. });
-            let limits = doubt::range(joint).filter(|_| !endless);
             let turn = turns.then_some((-std::f64::consts::PI, std::f64::consts::PI));
-            let (low, high) = stated.or(limits).or(turn).ok_or(id)?;
+            let allowed = match stated {
+                Some(_) => narrowed(model, id, stated),
+                None => range(model, id),
+            };
+            if stated.is_some() && allowed != stated {
+                by_followers.push(id);
+            }
+            let (low, high) = allowed.or(turn).ok_or(id)?;
             if high <= low {
                 base[id.index()] = low;
                 if stated.is_none() {
@@ -83,7 +92,12 @@ impl JointBox {
                 turns,
             });
         }
-        Ok(Self { moved, base, fixed })
+        Ok(Self {
+            moved,
+            base,
+            fixed,
+            narrowed: by_followers,
+        })
     }
 
     /// Postures by an Owen-scrambled Sobol sequence, the same for the same seed; after 65 536 by another one of another seed.
@@ -145,6 +159,19 @@ impl JointBox {
             if slides { ends[0].max(ends[1]) } else { 0.0 }
         };
         model.joint_ids().map(of).collect()
+    }
+
+    /// The moved joints that carry a link, themselves or by one that follows them, in the order of the URDF.
+    #[must_use]
+    pub fn movers(&self, model: &RobotModel, link: LinkId) -> Vec<JointId> {
+        let chain = model.chain_to_root(link).into_iter();
+        let laws = chain.map(|j| model.joint(j).law);
+        let sources: Vec<JointId> = laws
+            .filter(|law| law.multiplier != 0.0)
+            .map(|law| law.source)
+            .collect();
+        let moved = self.moved.iter().map(|m| m.joint);
+        moved.filter(|joint| sources.contains(joint)).collect()
     }
 
     /// A posture inside the ranges.

@@ -14,11 +14,11 @@ use calib_pipeline::options::Plugins;
 use calib_pipeline::prepare::inputs::{Inputs, RobotProfile};
 use calib_pipeline::prepare::load::load_recordings;
 use calib_pipeline::prepare::tracks::BodyTrack;
-use calib_profile::{Body, BodyKind, Usage};
+use calib_profile::{Body, BodyKind, Profile, Usage};
 use calib_urdf::JointId;
 use nalgebra::{Isometry3, Point3};
 
-use crate::note::Note;
+use crate::note::{JointNoiseOf, Note};
 
 /// What is known beforehand.
 #[derive(Debug, Clone)]
@@ -80,6 +80,22 @@ impl Known {
         Ok(Self::of_profile(robot, notes))
     }
 
+    /// σ of a joint's reading, rad, and where it is taken from; the largest, where joints have their own.
+    #[must_use]
+    pub fn joint_noise(&self) -> (f64, JointNoiseOf) {
+        if self.inputs.is_none() {
+            return joint_noise(&self.robot.profile);
+        }
+        let of_joints = self
+            .noise
+            .iter()
+            .filter(|(name, _)| name.starts_with(JOINTS));
+        let largest = of_joints.map(|(_, sigma)| *sigma).reduce(f64::max);
+        largest.map_or((0.0, JointNoiseOf::Solve), |sigma| {
+            (sigma, JointNoiseOf::Recordings)
+        })
+    }
+
     /// From recordings: a fit of everything that the profile frees.
     fn fitted(robot: &RobotProfile, mut inputs: Inputs) -> Result<Self, PipelineError> {
         // Recordings with errors would plan for another robot than this one.
@@ -139,6 +155,8 @@ impl Known {
         if unstated.count() > 0 {
             notes.push(Note::NoiseAssumed);
         }
+        let (sigma, of) = joint_noise(profile);
+        notes.push(Note::JointNoise { sigma, of });
         Self {
             placed: place.is_some(),
             unrecorded: BTreeSet::new(),
@@ -146,11 +164,24 @@ impl Known {
             tracks,
             start,
             values: BTreeMap::new(),
-            noise: BTreeMap::new(),
+            noise: BTreeMap::from([(JOINTS.to_owned(), sigma)]),
             still: Vec::new(),
             notes,
             robot,
         }
+    }
+}
+
+/// Name of the noise group of the joints.
+const JOINTS: &str = "joint";
+
+/// σ of a joint's reading where nothing is recorded, rad, and where it is taken from.
+fn joint_noise(profile: &Profile) -> (f64, JointNoiseOf) {
+    let simulated = profile.simulate.as_ref().map(|s| s.noise.joint);
+    match (profile.solve.noise.joint, simulated.filter(|s| *s > 0.0)) {
+        (Some(sigma), _) => (sigma, JointNoiseOf::Solve),
+        (None, Some(sigma)) => (sigma, JointNoiseOf::Simulation),
+        (None, None) => (ml::JOINT_SIGMA, JointNoiseOf::Program),
     }
 }
 

@@ -22,6 +22,7 @@ pub mod shape;
 pub mod sight;
 mod smallest;
 pub mod terminal;
+mod unchecked;
 pub mod view;
 mod words;
 pub mod write;
@@ -31,7 +32,7 @@ pub use follow::Follow;
 pub use known::Known;
 pub use list::{Goal, Plan};
 pub use nalgebra;
-pub use note::Note;
+pub use note::{JointNoiseOf, Note};
 pub use plan::plan;
 pub use prepare::Options;
 

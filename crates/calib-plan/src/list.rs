@@ -117,12 +117,11 @@ pub struct Parameter {
 }
 
 impl Plan {
-    /// The number of a posture in `plan.csv`, from its place in the list; `None`: it is only on the way, and nothing is recorded there.
+    /// The number of a posture in `plan.csv`, which is its place in the list; `None`: it is only on the way, and nothing is recorded there.
     #[must_use]
     pub fn pose(&self, place: usize) -> Option<usize> {
         let of = self.postures.get(place)?;
-        let before = self.postures[..place].iter();
-        (of.why != Why::Detour).then(|| before.filter(|p| p.why != Why::Detour).count())
+        (of.why != Why::Detour).then_some(place)
     }
 
     /// Postures that are recorded: those on the way are not.

@@ -2,8 +2,22 @@
 
 use serde::Serialize;
 
+/// Where the noise of the joints is taken from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum JointNoiseOf {
+    /// Recordings that exist show it.
+    Recordings,
+    /// The profile's `solve` section states it.
+    Solve,
+    /// The profile's `simulate` section states it.
+    Simulation,
+    /// Nothing tells it.
+    Program,
+}
+
 /// One assumption or limit of a plan.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(tag = "id", rename_all = "snake_case")]
 pub enum Note {
     /// Recordings of the profile whose files do not exist.
@@ -30,6 +44,13 @@ pub enum Note {
     },
     /// The tracker's noise is not stated.
     NoiseAssumed,
+    /// The noise of the joints.
+    JointNoise {
+        /// σ of a reading, rad.
+        sigma: f64,
+        /// Where it is taken from.
+        of: JointNoiseOf,
+    },
     /// Joints that stood still in all recordings stand still in the plan.
     JointsStill {
         /// Their names.
@@ -44,6 +65,15 @@ pub enum Note {
     SurroundingsUnchecked {
         /// What is stated: keys of `plan`.
         stated: Vec<String>,
+        /// The links that have none in the URDF.
+        links: Vec<String>,
+        /// Those of which one could not be read, with the file of the shape.
+        unread: Vec<(String, Option<String>)>,
+    },
+    /// Links that no planned joint moves touch what is stated in every posture: they are not compared with it.
+    StandsThere {
+        /// What is stated: keys of `plan`.
+        stated: Vec<String>,
         /// The links.
         links: Vec<String>,
     },
@@ -52,10 +82,15 @@ pub enum Note {
         /// Their names.
         joints: Vec<String>,
     },
-    /// Links of which a shape could not be read.
+    /// Joints whose stated range is wider than the limits of a joint that follows them allow.
+    NarrowedByFollower {
+        /// Each with a joint that follows it.
+        joints: Vec<[String; 2]>,
+    },
+    /// Shapes that could not be read.
     ShapeUnread {
-        /// Their names.
-        links: Vec<String>,
+        /// Their links and files.
+        shapes: Vec<(String, Option<String>)>,
     },
     /// Pairs of links that touch in nearly all postures by the size of their capsules: not compared.
     PairsNotCompared {

@@ -2,7 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use calib_pipeline::output::shapes::collision_solids;
+use calib_pipeline::output::shapes::{Unread, collision_solids};
 use calib_urdf::{JointId, LinkId, doubt};
 use nalgebra::DMatrix;
 use rayon::prelude::*;
@@ -18,6 +18,7 @@ use crate::list::{Goal, Parameter};
 use crate::note::Note;
 use crate::scene::Scene;
 use crate::sight::{Sight, Subject};
+use crate::unchecked;
 use crate::words;
 
 /// What is asked for.
@@ -116,9 +117,13 @@ pub fn prepare<'a>(known: &'a Known, options: &'a Options) -> Result<Prepared<'a
     }
     let mut notes = known.notes.clone();
     let (mut feasible, unread) = known.feasible(&joints, options.seed);
-    notes.extend(of_scene(known, &joints, &feasible.scene, unread));
+    notes.extend(unchecked::notes(known, &joints, &feasible.scene, &unread));
     // The terminal shows the first few: what can damage the robot is among them.
-    notes.sort_by_key(|note| !matches!(note, Note::SurroundingsUnchecked { .. }));
+    notes.sort_by_key(|note| match note {
+        Note::SurroundingsUnchecked { .. } => 0,
+        Note::StandsThere { .. } => 1,
+        _ => 2,
+    });
     let (candidates, counts) = feasible.all(joints.postures(options.candidates, options.seed));
     if candidates.is_empty() {
         let counts = Box::new(counts);
@@ -229,15 +234,15 @@ fn criterion(options: &Options, basis: &Basis, linear: &Linear, b: &DMatrix<f64>
 }
 
 impl Known {
-    /// What decides whether a posture is possible and what is seen in it, and the links of which a shape could not be read.
+    /// What decides whether a posture is possible and what is seen in it, and the shapes that could not be read.
     #[must_use]
-    pub fn feasible(&self, joints: &JointBox, seed: u32) -> (Feasible<'_>, Vec<String>) {
+    pub fn feasible(&self, joints: &JointBox, seed: u32) -> (Feasible<'_>, Vec<Unread>) {
         let model = &self.robot.model;
         let spec = &self.robot.profile.plan;
         let (solids, unread) = collision_solids(&self.robot);
         let for_pairs = joints.postures(PAIR_POSTURES, seed ^ SEED_PAIRS);
-        let scene = Scene::new(model, &solids, spec, &for_pairs);
-        let moves = |link: LinkId| joints.moved.iter().any(|m| model.carries(m.joint, link));
+        let scene = Scene::new(model, &solids, spec, (joints, &for_pairs));
+        let moves = |link: LinkId| !joints.movers(model, link).is_empty();
         let place = self.start.tracker_from_root;
         let mut sight = Sight::new(spec, self.subjects(&moves), place);
         sight.unrecorded = self.unrecorded.clone();
@@ -276,58 +281,6 @@ impl Known {
             high,
         }
     }
-}
-
-/// What cannot be looked at.
-fn of_scene(known: &Known, joints: &JointBox, scene: &Scene, unread: Vec<String>) -> Vec<Note> {
-    let model = &known.robot.model;
-    let spec = &known.robot.profile.plan;
-    let mut notes = Vec::new();
-    if !joints.fixed.is_empty() {
-        let names = joints.fixed.iter().map(|j| model.joint(*j).name.clone());
-        notes.push(Note::NoRoom {
-            joints: names.collect(),
-        });
-    }
-    let moved = |link: &LinkId| joints.moved.iter().any(|m| model.carries(m.joint, *link));
-    let has_shape = |link: &LinkId| scene.capsules.iter().any(|c| c.link == *link);
-    let without = model.link_ids().filter(|l| moved(l) && !has_shape(l));
-    let links: Vec<String> = without.map(|l| model.link(l).name.clone()).collect();
-    if !links.is_empty() {
-        let ground = spec.ground.map(|_| "plan.ground_mm".to_owned());
-        let boxes = spec.keep_outs.keys().map(|k| format!("plan.keep_outs.{k}"));
-        let stated: Vec<String> = ground.into_iter().chain(boxes).collect();
-        if !stated.is_empty() {
-            let links = links.clone();
-            notes.push(Note::SurroundingsUnchecked { stated, links });
-        }
-        notes.push(Note::NoShape { links });
-    }
-    if !unread.is_empty() {
-        notes.push(Note::ShapeUnread { links: unread });
-    }
-    let name = |part: usize| {
-        let of = scene.capsules.iter().find(|c| c.body == part);
-        of.map_or_else(String::new, |c| model.link(c.link).name.clone())
-    };
-    let named = |pairs: &[(usize, usize)]| -> Vec<[String; 2]> {
-        pairs.iter().map(|(a, b)| [name(*a), name(*b)]).collect()
-    };
-    if !scene.always.is_empty() {
-        let pairs = named(&scene.always);
-        notes.push(Note::PairsNotCompared { pairs });
-    }
-    if !scene.close.is_empty() {
-        let pairs = named(&scene.close);
-        notes.push(Note::PairsAlwaysClose { pairs });
-    }
-    if spec.cameras.is_empty() {
-        notes.push(Note::EverythingSeen);
-        if !spec.facing.is_empty() {
-            notes.push(Note::FacingUnused);
-        }
-    }
-    notes
 }
 
 /// Postures of the task box that touch nothing, seen or not.

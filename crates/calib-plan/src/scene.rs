@@ -1,12 +1,13 @@
 //! What a posture must not touch: the robot itself, keep-outs, the ground.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_profile::{KeepOut, PlanSpec};
 use calib_report::view3d::Solid;
 use calib_urdf::{JointId, JointKind, LinkId, RobotModel};
 use nalgebra::{Isometry3, Point3};
 
+use crate::joints::JointBox;
 use crate::shape::{Capsule, capsules};
 
 /// Why a posture or a motion is not possible.
@@ -46,21 +47,22 @@ pub struct Scene {
     pub clearance: f64,
     keep_outs: BTreeMap<String, KeepOut>,
     ground: Option<f64>,
-    /// The rigid part of the root: it may stand on the ground and in a keep-out.
-    root: usize,
+    /// The rigid parts that planned joints move: the others may stand on the ground and in a keep-out.
+    moving: BTreeSet<usize>,
 }
 
 /// Pairs that touch in more than this share of all postures of the joint box do so by the size of their capsules.
 const ALWAYS: f64 = 0.9;
 
 impl Scene {
-    /// From the shapes of the links; `postures` (over the joint box) tell which pairs touch always.
+    /// From the shapes of the links; `postures` (over the joint box) tell which pairs touch always. What no joint of the box moves is compared with
+    /// what moves only.
     #[must_use]
     pub fn new(
         model: &RobotModel,
         solids: &[Solid],
         spec: &PlanSpec,
-        postures: &[Vec<f64>],
+        (joints, postures): (&JointBox, &[Vec<f64>]),
     ) -> Self {
         let body = rigid_parts(model);
         let mut all = Vec::new();
@@ -81,10 +83,19 @@ impl Scene {
             .map(|c| c.body)
             .collect::<std::collections::BTreeSet<_>>();
         let parts: Vec<usize> = parts.into_iter().collect();
+        // The joints of the box that carry a part; the links of a part have the same ones.
+        let carriers = |part: usize| -> Vec<JointId> {
+            let link = all.iter().find(|c| c.body == part).map(|c| c.link);
+            link.map_or_else(Vec::new, |link| joints.movers(model, link))
+        };
+        let carried: BTreeMap<usize, Vec<JointId>> =
+            parts.iter().map(|part| (*part, carriers(*part))).collect();
         let mut pairs = Vec::new();
         for (i, a) in parts.iter().enumerate() {
             for b in &parts[i + 1..] {
-                if !neighbors.contains(&(*a, *b)) {
+                // What no joint of the box moves against each other is as it is in every posture.
+                let rigid = carried[a] == carried[b];
+                if !rigid && !neighbors.contains(&(*a, *b)) {
                     pairs.push((*a, *b));
                 }
             }
@@ -97,7 +108,11 @@ impl Scene {
             keep_outs: spec.keep_outs.clone(),
             ground: spec.ground,
             clearance: spec.clearance,
-            root: body[model.root().index()],
+            moving: carried
+                .into_iter()
+                .filter(|(_, by)| !by.is_empty())
+                .map(|(part, _)| part)
+                .collect(),
         };
         // Next but one in the chain: how near they are is of the robot's making.
         let next = |a: usize, b: usize| neighbors.contains(&(a.min(b), a.max(b)));
@@ -146,18 +161,9 @@ impl Scene {
     /// What the robot would touch; `None`: nothing.
     #[must_use]
     pub fn contact(&self, placed: &[Capsule]) -> Option<Contact> {
-        for (_, at) in self.moving(placed) {
-            if self
-                .ground
-                .is_some_and(|z| at.lowest() < z + self.clearance)
-            {
-                return Some(Contact::Ground);
-            }
-            for (name, b) in &self.keep_outs {
-                if at.distance_to_box(&b.size, &b.root_from_box) < self.clearance {
-                    return Some(Contact::KeepOut(name.clone()));
-                }
-            }
+        let mut moving = self.moving(placed);
+        if let Some(contact) = moving.find_map(|(_, at)| self.surroundings(at)) {
+            return Some(contact);
         }
         let touching = self
             .pairs
@@ -200,13 +206,43 @@ impl Scene {
         least
     }
 
-    /// Capsules of all parts but the root's.
+    /// Links that no planned joint moves, and that are in contact with ground or a keep-out in every posture; those of the root's part are not among
+    /// them.
+    #[must_use]
+    pub fn standing(&self, model: &RobotModel, base: &[f64]) -> Vec<LinkId> {
+        let placed = self.placed(&model.forward_kinematics(base));
+        let root = rigid_parts(model)[model.root().index()];
+        let all = self.capsules.iter().zip(&placed);
+        let still = all.filter(|(c, _)| c.body != root && !self.moving.contains(&c.body));
+        let mut links: Vec<LinkId> = still
+            .filter(|(_, at)| self.surroundings(at).is_some())
+            .map(|(c, _)| c.link)
+            .collect();
+        links.dedup();
+        links
+    }
+
+    /// What a capsule is too near to, beside the robot.
+    fn surroundings(&self, at: &Capsule) -> Option<Contact> {
+        if self
+            .ground
+            .is_some_and(|z| at.lowest() < z + self.clearance)
+        {
+            return Some(Contact::Ground);
+        }
+        let mut keep_outs = self.keep_outs.iter();
+        let near =
+            keep_outs.find(|(_, b)| at.distance_to_box(&b.size, &b.root_from_box) < self.clearance);
+        near.map(|(name, _)| Contact::KeepOut(name.clone()))
+    }
+
+    /// Capsules of all parts that planned joints move.
     fn moving<'a>(
         &'a self,
         placed: &'a [Capsule],
     ) -> impl Iterator<Item = (&'a LinkCapsule, &'a Capsule)> {
         let all = self.capsules.iter().zip(placed);
-        all.filter(|(c, _)| c.body != self.root)
+        all.filter(|(c, _)| self.moving.contains(&c.body))
     }
 
     /// How far any point of a capsule moves at the most by one unit (rad, m) of each joint, by joint index: the length of the way from the

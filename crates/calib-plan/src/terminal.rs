@@ -74,23 +74,26 @@ pub fn summary(plan: &Plan, folder: &str) -> String {
         );
         text += &wrapped(&line, "weak           ", "               ");
     }
+    let last = words::record_them(folder, detours, plan.blocked.is_empty(), &plan.notes);
+    let last = wrapped(&last, "", "");
+    let room = (NOTES + 1).saturating_sub(last.lines().count());
     let mut notes = String::new();
+    // What motions are not checked for stands in the last lines.
+    let others = plan.notes.iter().filter(|note| !words::is_unchecked(note));
     // First what is not written, or not determined: the rest may stand on the page alone.
     let first = |note: &Note| matches!(note, Note::NoClearMotion { .. } | Note::TaskOpen);
-    let (first, rest): (Vec<&Note>, Vec<&Note>) = plan.notes.iter().partition(|n| first(n));
+    let (first, rest): (Vec<&Note>, Vec<&Note>) = others.partition(|n| first(n));
+    let count = first.len() + rest.len();
     for (k, note) in first.into_iter().chain(rest).enumerate() {
         let one = wrapped(&words::note(note), "note: ", "      ");
-        if notes.lines().count() + one.lines().count() > NOTES {
-            let _ = writeln!(notes, "note: {} more in plan.html", plan.notes.len() - k);
+        if notes.lines().count() + one.lines().count() > room {
+            let _ = writeln!(notes, "note: {} more in plan.html", count - k);
             break;
         }
         notes += &one;
     }
     text += &notes;
-    let _ = writeln!(
-        text,
-        "Record the postures of {folder}/plan.csv in this order; see {folder}/plan.html"
-    );
+    text += &last;
     text
 }
 

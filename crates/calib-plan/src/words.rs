@@ -1,12 +1,16 @@
 //! Every sentence of a plan.
 
+mod motions;
+
 use calib_finding::number;
 use calib_report::Unit;
 use nalgebra::Vector3;
 
 use crate::candidates::Counts;
 use crate::list::{Goal, Why};
-use crate::note::Note;
+use crate::note::{JointNoiseOf, Note};
+
+pub use motions::{is_unchecked, record_them};
 
 /// A length with its unit; what is not determined says so.
 #[must_use]
@@ -108,6 +112,12 @@ pub fn most_removing(counts: &Counts) -> String {
     }
 }
 
+/// What the reasons in `plan.csv` mean that a person must know who moves the robot.
+pub const OF_TABLE: [&str; 2] = [
+    "move from row to row in this order; `note` is the reason of each posture",
+    "`detour`: only on the way around an obstacle, do not record",
+];
+
 /// Why a posture is in the list.
 #[must_use]
 pub fn why(why: Why) -> &'static str {
@@ -161,13 +171,71 @@ fn of_pairs(pairs: &[[String; 2]]) -> String {
     pairs.iter().map(of).collect::<Vec<_>>().join(", ")
 }
 
+/// The noise of the joints, and where it is taken from.
+#[must_use]
+pub fn joint_noise(sigma: f64, of: JointNoiseOf) -> String {
+    let sigma = number::plain(sigma, Unit::Radian);
+    match of {
+        JointNoiseOf::Recordings => {
+            format!("Noise of the joints: {sigma}, as the recordings show it.")
+        }
+        JointNoiseOf::Solve => format!("Noise of the joints: {sigma} (`solve.noise.joint_deg`)."),
+        JointNoiseOf::Simulation => {
+            format!("Noise of the joints: {sigma} (`simulate.noise.joint_deg`).")
+        }
+        JointNoiseOf::Program => format!(
+            "Noise of the joints: {sigma}, assumed. State `solve.noise.joint_deg` if you know it."
+        ),
+    }
+}
+
+/// What to do about shapes that could not be read.
+const READ_THEM: &str = "Put the files where the URDF names them, or state the folders of their packages under `robot.packages`.";
+
+/// Links with the files of their shapes.
+fn of_shapes(shapes: &[(String, Option<String>)]) -> String {
+    let of = |(link, file): &(String, Option<String>)| match file {
+        Some(file) => format!("`{link}` ({file})"),
+        None => format!("`{link}`"),
+    };
+    shapes.iter().map(of).collect::<Vec<_>>().join(", ")
+}
+
+fn names(names: &[String]) -> String {
+    let quoted: Vec<String> = names.iter().map(|n| format!("`{n}`")).collect();
+    quoted.join(", ")
+}
+
+fn surroundings_unchecked(
+    stated: &[String],
+    links: &[String],
+    unread: &[(String, Option<String>)],
+) -> String {
+    let is = if stated.len() == 1 { "is" } else { "are" };
+    let mut text = format!("{} {is} not compared with", names(stated));
+    if !links.is_empty() {
+        text += &format!(" links without shapes: {}", names(links));
+    }
+    if !unread.is_empty() {
+        let also = if links.is_empty() { "" } else { ", nor with" };
+        text += &format!(
+            "{also} shapes that could not be read: {}",
+            of_shapes(unread)
+        );
+    }
+    text += ". The plan may move them through.";
+    if !links.is_empty() {
+        text += " Give links `<collision>` shapes in the URDF.";
+    }
+    if !unread.is_empty() {
+        text += &format!(" {READ_THEM}");
+    }
+    text
+}
+
 /// A note as a sentence, with what to do.
 #[must_use]
 pub fn note(note: &Note) -> String {
-    let names = |names: &[String]| {
-        let quoted: Vec<String> = names.iter().map(|n| format!("`{n}`")).collect();
-        quoted.join(", ")
-    };
     match note {
         Note::NotRecordedYet { recordings } => {
             format!("Not recorded yet: {}. The plan does not count on them.", names(recordings))
@@ -194,18 +262,31 @@ pub fn note(note: &Note) -> String {
             "Collisions are not checked for links without shapes: {}.",
             names(links)
         ),
-        Note::SurroundingsUnchecked { stated, links } => format!(
-            "{} not compared with links without shapes: {}. The plan may move them through. Give them `<collision>` shapes in the URDF.",
-            if stated.len() == 1 { format!("{} is", names(stated)) } else { format!("{} are", names(stated)) },
+        Note::SurroundingsUnchecked {
+            stated,
+            links,
+            unread,
+        } => surroundings_unchecked(stated, links, unread),
+        Note::StandsThere { stated, links } => format!(
+            "In contact with {} in every posture, because no planned joint moves them, and not compared with it: {}.",
+            names(stated),
             names(links)
         ),
         Note::NoRoom { joints } => format!(
             "Held, because their limits in the URDF leave no range: {}. Correct the limits to move them.",
             names(joints)
         ),
-        Note::ShapeUnread { links } => format!(
-            "Some shapes could not be read, and collisions with them are not checked: {}.",
-            names(links)
+        Note::NarrowedByFollower { joints } => {
+            let of = |[joint, follower]: &[String; 2]| format!("`{joint}` (`{follower}`)");
+            let all: Vec<String> = joints.iter().map(of).collect();
+            format!(
+                "Ranges of `plan.joints` narrowed by the limits of a joint that follows: {}.",
+                all.join(", ")
+            )
+        }
+        Note::ShapeUnread { shapes } => format!(
+            "Collisions are not checked for shapes that could not be read: {}. {READ_THEM}",
+            of_shapes(shapes)
         ),
         Note::PairsNotCompared { pairs } => format!(
             "Not compared, because their capsules overlap in nearly all postures: {}. Watch them in the first run.",
@@ -215,6 +296,7 @@ pub fn note(note: &Note) -> String {
             "Nearer than the clearance in nearly all postures, and kept from touching only: {}.",
             of_pairs(pairs)
         ),
+        Note::JointNoise { sigma, of } => joint_noise(*sigma, *of),
         Note::EverythingSeen => {
             "No cameras are stated: every marker counts as seen. State `plan.cameras` where markers can be hidden.".to_owned()
         }

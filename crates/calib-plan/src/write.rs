@@ -16,9 +16,29 @@ use crate::list::{Goal, Parameter, Plan, Why};
 use crate::note::Note;
 use crate::page::page;
 use crate::places;
+use crate::words;
 
 /// What is wrong with a table that cannot be written.
 const RENAME: &str = "rename the joint in the URDF";
+
+/// Every file that a plan can have.
+const FILES: [&str; 5] = [
+    "plan.yaml",
+    "plan.csv",
+    "held_out.csv",
+    "plan.html",
+    "trajectory.json",
+];
+
+/// Names of the files that this plan does not have: they must not remain from an earlier one.
+#[must_use]
+pub fn not_written(files: &[OutputFile]) -> Vec<&'static str> {
+    let has = |name: &str| files.iter().any(|file| file.name == name);
+    FILES.into_iter().filter(|name| !has(name)).collect()
+}
+
+/// Column of `plan.csv` with the reason of each posture.
+const REASON: &str = "note";
 
 /// Version of `plan.yaml`.
 const VERSION: u32 = 1;
@@ -79,7 +99,7 @@ impl Default for AskedLine {
 /// A posture as it is written.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PostureLine {
-    /// As in `plan.csv`; absent: only on the way, nothing is recorded.
+    /// Its row in `plan.csv`, from 0; absent: only on the way, nothing is recorded.
     pub pose: Option<usize>,
     /// Why it is there.
     pub why: Why,
@@ -148,14 +168,17 @@ impl Plan {
     pub fn files(&self, model: &RobotModel, profile: &str) -> Result<Vec<OutputFile>, PlanError> {
         let file = self.file(model);
         let yaml = serde_saphyr::to_string(&file).map_err(|e| unwritable("plan.yaml", &e))?;
-        let recorded = self.postures.iter().filter(|p| p.why != Why::Detour);
-        let q: Vec<&Vec<f64>> = recorded.map(|p| &p.q).collect();
+        let q: Vec<&Vec<f64>> = self.postures.iter().map(|p| &p.q).collect();
+        let reasons = self.postures.iter().map(|p| words::why(p.why).to_owned());
         let held_out: Vec<&Vec<f64>> = self.held_out.iter().collect();
         let html = page(self, model, profile).map_err(|e| unwritable("plan.html", &e))?;
         let mut files = vec![
             OutputFile::text("plan.yaml", yaml),
-            OutputFile::text("plan.csv", table(model, profile, &q)?),
-            OutputFile::text("held_out.csv", table(model, profile, &held_out)?),
+            OutputFile::text("plan.csv", table(model, profile, &q, reasons.collect())?),
+            OutputFile::text(
+                "held_out.csv",
+                table(model, profile, &held_out, Vec::new())?,
+            ),
             OutputFile::text("plan.html", html),
         ];
         // A list of points that a controller would drive through must not lead through anything.
@@ -302,7 +325,8 @@ impl PlanFile {
     }
 }
 
-/// Reads a list of postures: a table with joint columns. Joints that it does not name are where the others stand.
+/// Reads a list of postures: a table with joint columns. Joints that it does not name are where the others stand; rows of a plan that are only
+/// on the way are left out.
 ///
 /// # Errors
 /// [`PlanError::NotJoints`] for a table of something else, [`PlanError::OutOfReach`] for positions outside the ranges.
@@ -366,7 +390,9 @@ fn of_joints(
         columns.push((id, column));
     }
     let mut postures = Vec::new();
-    for row in 0..table.len() {
+    let reasons = table.labels.get(REASON);
+    let on_the_way = |row: usize| reasons.is_some_and(|r| r[row] == words::why(Why::Detour));
+    for row in (0..table.len()).filter(|row| !on_the_way(*row)) {
         let mut q = joints.base.clone();
         for (id, column) in &columns {
             let missing = || {
@@ -412,10 +438,20 @@ fn rounded(value: f64, decimals: i32) -> f64 {
     (value * scale).round() / scale + 0.0
 }
 
-fn table(model: &RobotModel, profile: &str, postures: &[&Vec<f64>]) -> Result<String, PlanError> {
-    let poses = joint_table(model, postures);
+fn table(
+    model: &RobotModel,
+    profile: &str,
+    postures: &[&Vec<f64>],
+    reasons: Vec<String>,
+) -> Result<String, PlanError> {
+    let mut poses = joint_table(model, postures);
+    let mut comments = vec![format!("planned by `calib plan {profile}`")];
+    if !reasons.is_empty() {
+        comments.extend(words::OF_TABLE.map(str::to_owned));
+        poses.labels.insert(REASON.to_owned(), reasons);
+    }
     let options = WriteOptions {
-        comments: vec![format!("planned by `calib plan {profile}`")],
+        comments,
         decimals: Some(5),
         degrees: true,
         ..WriteOptions::default()

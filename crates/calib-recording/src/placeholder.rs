@@ -2,8 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use calib_finding::{Fact, Finding, Subject, catalog};
+use calib_finding::{Fact, Finding, Subject, Unit, catalog};
 use nalgebra::Point3;
+
+use crate::model::{Filled, MarkerSample};
 
 /// Nothing is measured as far away, m.
 const FAR: f64 = 1e5;
@@ -23,6 +25,57 @@ fn nines(value: f64) -> bool {
         let power = 10.0_f64.powf(next.log10().round());
         power >= LEAST && (next - power).abs() < 1e-9 * power
     })
+}
+
+/// A sample this near to a number that stands for nothing may be a measurement, m: the number is then none.
+const NEAR: f64 = 0.02;
+/// Samples that show a number which stands for nothing.
+const REPEATED: usize = 2;
+
+/// Numbers (m) that stand for nothing, found by their use: all three coordinates have it exactly, in [`REPEATED`] samples at least, and the other
+/// samples of these markers are elsewhere. Three equal coordinates are a coincidence once, and twice they are none.
+pub(crate) fn repeated(markers: &[Vec<MarkerSample>]) -> Vec<f64> {
+    let mut counts: BTreeMap<u64, usize> = BTreeMap::new();
+    for value in markers.iter().flatten().filter_map(equal) {
+        *counts.entry(value.to_bits()).or_default() += 1;
+    }
+    counts.retain(|_, count| *count >= REPEATED);
+    let values = counts.into_keys().map(f64::from_bits);
+    values
+        .filter(|value| stands_for_nothing(*value, markers))
+        .collect()
+}
+
+/// The markers that have the number are elsewhere otherwise, and one of them is anywhere else.
+fn stands_for_nothing(value: f64, markers: &[Vec<MarkerSample>]) -> bool {
+    let code = Point3::new(value, value, value);
+    let has = |track: &&Vec<MarkerSample>| track.iter().any(|s| equal(s) == Some(value));
+    let others = markers.iter().filter(has).flatten();
+    let mut others = others.filter(|s| equal(s) != Some(value));
+    let (mut any, mut near) = (false, false);
+    for point in others.by_ref().filter_map(|s| s.point(Filled::Include)) {
+        any = true;
+        near |= (point - code).norm() < NEAR;
+    }
+    any && !near
+}
+
+/// The number that all three coordinates of a sample are; 0 is another rule's.
+pub(crate) fn equal(sample: &MarkerSample) -> Option<f64> {
+    let at = sample.point(Filled::Include)?;
+    (at.x == at.y && at.y == at.z && at.x != 0.0).then_some(at.x)
+}
+
+/// What was read as lost because a number repeats, of one marker.
+pub(crate) fn repeated_finding(name: &str, value: f64, rows: Vec<u64>) -> Finding {
+    Finding::of_kind(
+        catalog::PLACEHOLDER_TRIPLET,
+        "repeated",
+        Subject::marker(name),
+    )
+    .with("samples", Fact::count(rows.len()))
+    .with("value", Fact::number(value, Unit::Meter))
+    .at_rows(rows)
 }
 
 /// Rows of lost samples by marker or body.

@@ -4,6 +4,7 @@ use std::iter::repeat;
 
 use calib_profile::Protocol;
 use calib_urdf::RobotModel;
+use calib_urdf::range::resting_positions;
 use rand::RngExt;
 use rand_chacha::ChaCha12Rng;
 
@@ -18,13 +19,14 @@ pub struct Commanded {
     pub tracker_noise_times: Vec<f64>,
 }
 
-/// Expands a protocol: the grid or the random poses, repeated at each value of the repeated joint.
+/// Expands a protocol: the grid or the random poses, repeated at each value of the repeated joint. Joints that it does not name stand as near to
+/// 0 as their limits allow.
 pub fn commanded_poses(
     protocol: &Protocol,
     model: &RobotModel,
     rng: &mut ChaCha12Rng,
 ) -> Commanded {
-    let mut base = model.zero_positions();
+    let mut base = resting_positions(model);
     for (joint, value) in &protocol.hold {
         base[joint.index()] = *value;
     }

@@ -3,6 +3,7 @@
 use calib_profile::{Profile, TimedPoses, Timing};
 use calib_recording::Poses;
 use calib_urdf::RobotModel;
+use calib_urdf::range::resting_positions;
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
@@ -54,7 +55,7 @@ pub fn timed(
     let mut rng = stream(seed, STREAMS + index);
     // Indicated positions, and how far the true ones are off while the robot stands there.
     let posture = |row: usize| -> Vec<f64> {
-        let mut q = model.zero_positions();
+        let mut q = resting_positions(model);
         for id in model.independent_joints() {
             let column = postures.joints.get(&model.joint(id).name);
             q[id.index()] = column.and_then(|c| c[row]).unwrap_or(q[id.index()]);
@@ -89,7 +90,7 @@ pub fn timed(
         let between = |at: &[Vec<f64>], joint: usize| {
             at[from][joint] + share * (at[to][joint] - at[from][joint])
         };
-        let mut q = model.zero_positions();
+        let mut q = resting_positions(model);
         for id in model.independent_joints() {
             let shown = between(&indicated, id.index());
             q[id.index()] = shown + between(&errors, id.index());

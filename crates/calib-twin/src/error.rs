@@ -87,6 +87,17 @@ pub enum TwinError {
     /// The state file cannot be used.
     #[error(transparent)]
     State(#[from] FileError),
+    /// A folder with trials of another session.
+    #[error(
+        "{file}: the trials in this folder are of another session: {} {}\n  help: choose another folder with --out, or start over with --restart",
+        .what.join(", "), if .what.len() == 1 { "differs" } else { "differ" }
+    )]
+    OtherSession {
+        /// The file of the trials.
+        file: String,
+        /// What differs.
+        what: Vec<String>,
+    },
     /// A result has no JSON form.
     #[error("a result cannot be written: {0}\n  help: report this as a defect")]
     Unwritable(#[from] serde_json::Error),
@@ -111,6 +122,7 @@ impl TwinError {
     pub fn file(&self) -> Option<&str> {
         match self {
             Self::OtherRobot { file, .. }
+            | Self::OtherSession { file, .. }
             | Self::NoLikelihood { file }
             | Self::Contacts { file }
             | Self::NothingToSimulate { file } => Some(file),

@@ -11,12 +11,14 @@ pub enum NoiseOf {
     Recordings,
     /// The profile states it.
     Profile,
+    /// The profile's `simulate` section states it.
+    Simulation,
     /// Nothing tells it: what the program takes for a tracker.
     Program,
 }
 
 /// One assumption or limit of a twin.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "id", rename_all = "snake_case")]
 pub enum Note {
     /// Rows of motions are taken as postures: that the clocks go together is not tried again.
@@ -39,6 +41,10 @@ pub enum Note {
         beside: usize,
         /// Whose noise they have.
         noise: NoiseOf,
+        /// σ of a joint's reading, rad.
+        joint_sigma: f64,
+        /// Where it is taken from.
+        joint_noise: NoiseOf,
     },
     /// Origins whose sweeps are not recorded are left out.
     OriginsWithoutSweep {

@@ -11,10 +11,10 @@ use calib_pipeline::formulate::solved::nominal;
 use calib_pipeline::options::Plugins;
 use calib_pipeline::prepare::inputs::{Inputs, RobotProfile};
 use calib_pipeline::prepare::load::{load_recordings, load_robot, of_tables};
-use calib_plan::Known;
 use calib_plan::known::without_missing;
 use calib_plan::linear::{joint_table, planned_recording};
 use calib_plan::write::PlanFile;
+use calib_plan::{JointNoiseOf, Known};
 use calib_profile::{Profile, Usage};
 use calib_report::{read_report, report_path};
 use nalgebra::{Isometry3, Point3};
@@ -103,15 +103,23 @@ fn without_sweep(robot: &mut RobotProfile, notes: &mut Vec<Note>) {
 fn from_plan(known: &Known, postures: usize) -> Note {
     let before = known.inputs.iter().flat_map(|i| i.recordings.values());
     let fitted = before.filter(|r| r.spec.usage != Usage::Validation);
-    let noise = match (known.noise.is_empty(), has_noise(&known.robot.profile)) {
-        (false, _) => NoiseOf::Recordings,
-        (true, true) => NoiseOf::Profile,
-        (true, false) => NoiseOf::Program,
+    let noise = match (known.inputs.is_some(), has_noise(&known.robot.profile)) {
+        (true, _) => NoiseOf::Recordings,
+        (false, true) => NoiseOf::Profile,
+        (false, false) => NoiseOf::Program,
     };
+    let (joint_sigma, of) = known.joint_noise();
     Note::FromPlan {
         postures,
         beside: fitted.map(|r| r.poses.len()).sum(),
         noise,
+        joint_sigma,
+        joint_noise: match of {
+            JointNoiseOf::Recordings => NoiseOf::Recordings,
+            JointNoiseOf::Solve => NoiseOf::Profile,
+            JointNoiseOf::Simulation => NoiseOf::Simulation,
+            JointNoiseOf::Program => NoiseOf::Program,
+        },
     }
 }
 

@@ -1,13 +1,14 @@
 //! Finished trials on disk: one line of JSON each, below a line with the settings.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-use calib_files::StateFile;
+use calib_files::{FileError, StateFile};
 use serde::{Deserialize, Serialize};
 
 use crate::error::TwinError;
 use crate::trial::{Injected, Trial};
+use crate::words;
 
 /// Name of the file of finished trials.
 pub const STATE: &str = "twin.state.jsonl";
@@ -19,12 +20,31 @@ pub struct Settings {
     pub calib_twin: u32,
     /// Version of the program.
     pub version: String,
-    /// SHA-256 of everything that the session was read from.
-    pub inputs: Vec<String>,
+    /// SHA-256 of everything that the session was read from, by name.
+    pub inputs: BTreeMap<String, String>,
     /// Seed.
     pub seed: u64,
     /// Where true robots are drawn, and what the noise is multiplied by.
     pub how: String,
+}
+
+impl Settings {
+    /// What differs from the settings of a file's first line.
+    fn unlike(&self, found: &str) -> Vec<String> {
+        let Ok(other) = serde_json::from_str::<Self>(found) else {
+            return vec![words::VERSION.to_owned()];
+        };
+        let names: BTreeSet<&String> = self.inputs.keys().chain(other.inputs.keys()).collect();
+        let differs = |name: &&String| self.inputs.get(*name) != other.inputs.get(*name);
+        let mut what: Vec<String> = names.into_iter().filter(differs).cloned().collect();
+        let same = [
+            (self.seed == other.seed, words::SEED),
+            (self.how == other.how, words::HOW),
+            (self.version == other.version, words::VERSION),
+        ];
+        what.extend(same.iter().filter(|s| !s.0).map(|s| s.1.to_owned()));
+        what
+    }
 }
 
 #[derive(Debug, Serialize, Deserialize)]
@@ -60,9 +80,16 @@ impl State {
         let Some(folder) = folder else {
             return Ok(state);
         };
-        let settings = serde_json::to_string(settings)?;
+        let text = serde_json::to_string(settings)?;
         let is_whole = |line: &str| serde_json::from_str::<Line>(line).is_ok();
-        let (file, lines) = StateFile::open(&folder.join(STATE), &settings, resume, is_whole)?;
+        let opened = StateFile::open(&folder.join(STATE), &text, resume, is_whole);
+        let (file, lines) = opened.map_err(|error| match error {
+            FileError::OtherState { path, found, .. } => TwinError::OtherSession {
+                file: path.display().to_string(),
+                what: settings.unlike(&found),
+            },
+            error => error.into(),
+        })?;
         state.file = Some(file);
         for line in lines.iter().filter_map(|l| serde_json::from_str(l).ok()) {
             match line {

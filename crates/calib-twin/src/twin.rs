@@ -22,6 +22,7 @@ use crate::state::{Settings, State};
 use crate::summary::{Promise, promises};
 use crate::trial::{Done, Injected, Trial};
 use crate::truth::About;
+use crate::words;
 
 /// How a twin is made.
 #[derive(Debug, Clone, PartialEq)]
@@ -227,13 +228,14 @@ pub fn settings_text(session: &Session, options: &Options) -> Result<String, Twi
 
 fn settings(session: &Session, options: &Options) -> Settings {
     // The rows as the fit saw them: whatever they were read from.
-    let rows = session.rows.recordings.values().map(|r| {
+    let rows = session.rows.recordings.iter().map(|(name, r)| {
         let poses = format!("{:?} {:?} {:?}", r.q, r.poses.markers, r.poses.bodies);
-        sha256_hex(poses.as_bytes())
+        (words::rows_of(name), sha256_hex(poses.as_bytes()))
     });
-    let files = session.rows.robot.digests.iter().map(|d| d.sha256.clone());
+    let files = session.rows.robot.digests.iter();
+    let files = files.map(|d| (format!("`{}`", d.path), d.sha256.clone()));
     Settings {
-        calib_twin: 2,
+        calib_twin: 3,
         version: env!("CARGO_PKG_VERSION").to_owned(),
         inputs: files.chain(rows).collect(),
         seed: options.seed,

@@ -74,6 +74,18 @@ pub fn calibrated(whole: usize, trials: usize) -> String {
     )
 }
 
+/// What the settings of trials are called that do not go together.
+pub(crate) const SEED: &str = "`--seed`";
+/// See [`SEED`].
+pub(crate) const HOW: &str = "`--truth` or `--noise-times`";
+/// See [`SEED`].
+pub(crate) const VERSION: &str = "the version of the program";
+
+/// What the rows of a recording, or of a plan in its place, are called.
+pub(crate) fn rows_of(recording: &str) -> String {
+    format!("the postures of `{recording}` (recorded or planned)")
+}
+
 /// A note as a sentence.
 #[must_use]
 pub fn note(note: &Note) -> String {
@@ -93,19 +105,32 @@ pub fn note(note: &Note) -> String {
             postures,
             beside,
             noise,
+            joint_sigma,
+            joint_noise,
         } => {
             let beside = match beside {
                 0 => String::new(),
                 rows => format!(", recorded beside the {rows} rows that exist"),
             };
             let noise = match noise {
-                NoiseOf::Recordings => "the noise that the recordings show",
-                NoiseOf::Profile => "the noise that the profile states",
+                NoiseOf::Recordings => "the tracker noise that the recordings show",
+                NoiseOf::Profile | NoiseOf::Simulation => {
+                    "the tracker noise that the profile states"
+                }
                 NoiseOf::Program => {
-                    "the noise that the program takes where none is stated or recorded"
+                    "the tracker noise that the program takes where none is stated or recorded"
                 }
             };
-            format!("The postures are the {postures} of the plan{beside}, with {noise}.")
+            let of_joints = match joint_noise {
+                NoiseOf::Recordings => "as the recordings show it",
+                NoiseOf::Profile => "`solve.noise.joint_deg`",
+                NoiseOf::Simulation => "`simulate.noise.joint_deg`",
+                NoiseOf::Program => "assumed: state `solve.noise.joint_deg` if you know it",
+            };
+            let joints = number::plain(*joint_sigma, Unit::Radian);
+            format!(
+                "The postures are the {postures} of the plan{beside}, with {noise}; joints have a noise of {joints} ({of_joints})."
+            )
         }
         Note::OriginsWithoutSweep { origins } => format!(
             "Left out, because their sweeps are not recorded: {}.",

@@ -46,6 +46,7 @@ pub mod error;
 pub mod kinematics;
 mod masses;
 pub mod model;
+pub mod range;
 pub mod read;
 pub mod xacro;
 pub mod yaml;

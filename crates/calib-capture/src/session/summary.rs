@@ -151,15 +151,20 @@ impl Session<'_> {
                 summary.in_file, summary.poses
             ));
         }
+        // The tracker's clock of this file does not go on.
+        let how = match self.restarted {
+            true => "Record them in a new file.",
+            false => "Repeat the command with `--append` to record them.",
+        };
         let to_come = self.listed().saturating_sub(summary.in_file);
         if self.planner.is_some() && to_come > 0 && !self.reached {
             screen.line(&format!(
-                "{to_come} poses of the plan are still to come. Repeat the command with `--append` to record them."
+                "{to_come} poses of the plan are still to come. {how}"
             ));
         }
         if !summary.missing.is_empty() {
             screen.line(&format!(
-                "missing: pose {}. Repeat the command with `--append` to record them.",
+                "missing: pose {}. {how}",
                 ranges(&summary.missing)
             ));
         }

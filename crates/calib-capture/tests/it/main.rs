@@ -7,5 +7,6 @@ mod order;
 mod plain;
 mod senders;
 mod session;
+mod still;
 mod table;
 mod vrpn;

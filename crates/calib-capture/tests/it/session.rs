@@ -505,10 +505,10 @@ fn the_status_says_what_a_pose_waits_for() {
     note(&scene);
     silent(&mut scene, "waist_x_deg=3 lift_m=0.2");
     note(&scene);
-    // It is there, but still trembles.
+    // It is there, but still trembles: ten times a second. From frame to frame it would be noise of the tracker.
     scene.go(-0.5);
     for i in 0..40 {
-        scene.waist = -0.5 + 0.004 * f64::from(i % 2);
+        scene.waist = -0.5 + 0.004 * f64::from(i / 5 % 2);
         scene.frame(true);
     }
     note(&scene);
@@ -535,4 +535,25 @@ fn a_motion_has_no_poses() {
     assert_eq!(scene.session.summary().rows, scene.number);
     drop(scene);
     assert_eq!(holds(&path).len(), 1);
+}
+
+#[test]
+fn after_a_restart_of_the_tracker_nothing_advises_to_append() {
+    for restarts in [false, true] {
+        let folder = tempfile::tempdir().expect("folder");
+        let mut scene = Scene::new(&folder.path().join("a.csv"), plan(JointSource::Targets, 3));
+        scene.key(Key::There);
+        scene.stay(110);
+        scene.go(0.0);
+        scene.key(Key::Skip);
+        if restarts {
+            scene.number = 0;
+            scene.stay(60);
+        }
+        scene.session.report(&mut scene.said);
+        let said = &scene.said.0;
+        assert!(said.contains("missing: pose 2"), "{said}");
+        assert_eq!(said.contains("in a new file"), restarts, "{said}");
+        assert_eq!(said.contains("--append"), !restarts, "{said}");
+    }
 }

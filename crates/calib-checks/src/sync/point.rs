@@ -206,8 +206,12 @@ pub fn clock_offset_of_point(
         };
     }
     let seen = a.thinned(SEARCHED);
-    let count = (settings.max_offset / SEARCH_STEP).floor() as i64;
-    let searched: Vec<(f64, f64)> = (-count..=count)
+    // Beyond, the two have no time in common.
+    let in_common = |at: fn(&[f64], &[f64]) -> f64| at(&a.t, &b.t);
+    let least = in_common(|a, b| a[0] - b[b.len() - 1]).max(-settings.max_offset);
+    let most = in_common(|a, b| a[a.len() - 1] - b[0]).min(settings.max_offset);
+    let steps = ((least / SEARCH_STEP).ceil() as i64)..=((most / SEARCH_STEP).floor() as i64);
+    let searched: Vec<(f64, f64)> = steps
         .map(|k| k as f64 * SEARCH_STEP)
         .filter_map(|offset| Some((offset, left_at(&seen, b, offset)?)))
         .collect();

@@ -117,7 +117,9 @@ pub fn run(console: &Console, options: &PlanPostures) -> Result<ExitCode, CliErr
     let plan = calib_plan::plan(&known, &asked)?;
     let model = &known.robot.model;
     progress("write the plan");
-    folder.write(&plan.files(model, &known.robot.file)?)?;
+    let files = plan.files(model, &known.robot.file)?;
+    let folder = folder.without(&write::not_written(&files));
+    folder.write(&files)?;
     bar.finish_and_clear();
     emit(&match (console.json, console.quiet) {
         (true, _) => plan.json(model)?,

@@ -9,6 +9,7 @@ use calib_pipeline::prepare::load::{RobotProfile, load_robot};
 use calib_plan::PlanError;
 use calib_profile::{RecordingSpec, Usage};
 use calib_recording::{ColumnMap, NotWritten, Poses, WriteOptions, write_mapped, write_poses};
+use calib_urdf::range::resting_positions;
 use clap::Args;
 
 use super::plan_file::plan_of;
@@ -149,7 +150,7 @@ fn postures(
     path: &Path,
 ) -> Result<BTreeMap<String, Vec<Vec<f64>>>, CliError> {
     let plan = plan_of(path, robot)?;
-    let mut base = robot.model.zero_positions();
+    let mut base = resting_positions(&robot.model);
     for (joint, value) in &robot.profile.plan.hold {
         base[joint.index()] = *value;
     }

@@ -68,6 +68,7 @@ impl CliError {
             | Self::NotATime { .. }
             | Self::Twin(TwinError::Plan(_)) => "plan",
             Self::Twin(TwinError::State(error)) => of_file(error),
+            Self::Twin(TwinError::OtherSession { .. }) => "other-state",
             Self::Twin(_) | Self::NotANoiseFactor { .. } => "twin",
             Self::Apply(error) => of_apply(error),
             Self::Drift(_) => "drift",

@@ -15,6 +15,9 @@ super::topic! {
         "": Warning,
             "{samples:sample} whose coordinates are all the same number, one that stands for a lost sample; taken as lost.",
             "Export lost samples as empty.";
+        "repeated": Warning,
+            "{samples:sample} whose coordinates are all exactly {value}, far from the others of the marker; taken as lost.",
+            "Export lost samples as empty.";
     }
     /// Two markers with the same coordinates.
     DUPLICATE_COLUMN = "duplicate-column" {

@@ -9,7 +9,7 @@ use calib_recording::{Poses, WriteOptions, write_poses};
 use calib_sim::{Motion, StreamPlan, Streams, simulate, simulate_streams};
 use calib_urdf::RobotModel;
 
-const URDF: &str = include_str!("../../../../book/src/tutorial/arm.urdf");
+pub const URDF: &str = include_str!("../../../../book/src/tutorial/arm.urdf");
 
 /// What is bolted to a link.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -225,7 +225,7 @@ pub fn link_of(proposal: &Proposal, body: &str) -> String {
 }
 
 /// A table with other cells: `change(column, cell)`.
-pub fn with_cells(table: &str, change: impl Fn(&str, &str) -> String) -> String {
+pub fn with_cells(table: &str, mut change: impl FnMut(&str, &str) -> String) -> String {
     let mut names: Option<Vec<String>> = None;
     let mut out = String::new();
     for line in table.lines() {

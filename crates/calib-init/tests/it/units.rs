@@ -6,7 +6,8 @@ use calib_recording::LengthUnit;
 use calib_urdf::RobotModel;
 
 use crate::lab::{
-    Design, Kind, arm, file, link_of, proposed, recordings, request, text, with_cells, with_names,
+    Design, Kind, URDF, arm, file, link_of, proposed, recordings, request, text, with_cells,
+    with_names,
 };
 
 const HAND: [(&str, &str, Kind); 1] = [("hand", "flange", Kind::Markers(4))];
@@ -283,4 +284,35 @@ fn what_agrees_only_after_a_correction_says_so() {
     assert_eq!(after(&swapped), Some(true));
     let right = proposed(&[file("poses", table)]);
     assert_eq!(after(&right), Some(false));
+}
+
+/// The arm with `joint_2` followed by `joint_3` within ±0.2 rad, and `joint_5` with exchanged limits.
+#[test]
+fn limits_of_followers_and_exchanged_limits_count() {
+    let mut text = URDF.to_owned();
+    let limit_of = |text: &str, joint: &str| {
+        let from = text.find(&format!("name=\"{joint}\"")).expect("a joint");
+        let at = from + text[from..].find("<limit").expect("a limit");
+        (at, at + text[at..].find("/>").expect("its end") + 2)
+    };
+    let (from, to) = limit_of(&text, "joint_3");
+    let follower = "<limit lower=\"-0.2\" upper=\"0.2\" effort=\"1\" velocity=\"1\"/><mimic joint=\"joint_2\" multiplier=\"-1\"/>";
+    text.replace_range(from..to, follower);
+    let (from, to) = limit_of(&text, "joint_5");
+    let exchanged = "<limit lower=\"2.0\" upper=\"-1.7\" effort=\"1\" velocity=\"1\"/>";
+    text.replace_range(from..to, exchanged);
+    let model = RobotModel::from_urdf_text(&text, "arm.urdf").expect("a robot");
+    let proposal = propose(&model, &request(), &[]).expect("a profile");
+    let skeleton = proposal.skeleton.as_ref().expect("postures");
+    let second = model.joint_id("joint_2").expect("a joint");
+    let range = skeleton.random.iter().find(|(joint, _)| *joint == second);
+    let (low, high) = range.expect("it moves").1;
+    assert!(low >= -0.2 && high <= 0.2, "{low} {high}");
+    let said: Vec<String> = proposal
+        .to_check()
+        .map(|f| calib_init::words::sentence(&f.about))
+        .collect();
+    let said = said.join("\n");
+    assert!(said.contains("lower limit of `joint_5` is above"), "{said}");
+    assert!(!said.contains("No limits are given"), "{said}");
 }

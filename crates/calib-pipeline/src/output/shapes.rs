@@ -94,10 +94,19 @@ pub fn solids(robot: &RobotProfile, findings: &mut Vec<Finding>) -> (Vec<Solid>,
     (solids, read)
 }
 
+/// A shape of a link that could not be read.
+#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Unread {
+    /// The link.
+    pub link: String,
+    /// The mesh file, as the URDF names it; absent: the URDF states the shape wrongly.
+    pub file: Option<String>,
+}
+
 /// The shapes that stand for the links where collisions are looked for: those of `<collision>`, else of `<visual>`, link by link.
-/// Also the links of which some shape could not be read.
+/// Also what could not be read.
 #[must_use]
-pub fn collision_solids(robot: &RobotProfile) -> (Vec<Solid>, Vec<String>) {
+pub fn collision_solids(robot: &RobotProfile) -> (Vec<Solid>, Vec<Unread>) {
     let file = &robot.profile.urdf;
     let (Ok((stated, bad)), Ok((drawn, faults))) = (
         collisions(&robot.urdf_text, file),
@@ -108,16 +117,20 @@ pub fn collision_solids(robot: &RobotProfile) -> (Vec<Solid>, Vec<String>) {
     let has_own = |link: &String| stated.iter().any(|shape| shape.link == *link);
     let drawn = drawn.iter().filter(|shape| !has_own(&shape.link));
     let (mut solids, mut unread) = (Vec::new(), Vec::new());
-    unread.extend(bad.into_iter().map(|fault| fault.link));
+    let without_file = |link: String| Unread { link, file: None };
+    unread.extend(bad.into_iter().map(|fault| without_file(fault.link)));
     let faults = faults.into_iter().filter(|fault| !has_own(&fault.link));
-    unread.extend(faults.map(|fault| fault.link));
+    unread.extend(faults.map(|fault| without_file(fault.link)));
     for shape in stated.iter().chain(drawn) {
         let Ok(link) = robot.model.link_id(&shape.link) else {
             continue;
         };
         match solid(robot, link.index(), shape) {
             Ok((solid, _)) => solids.push(solid),
-            Err(_) => unread.push(shape.link.clone()),
+            Err((file, _)) => unread.push(Unread {
+                link: shape.link.clone(),
+                file: Some(file),
+            }),
         }
     }
     unread.sort();

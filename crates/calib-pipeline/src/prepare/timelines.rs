@@ -8,7 +8,7 @@ use calib_checks::sync::{
     ClockMap, LinkTrack, OffsetOutcome, OffsetSettings, PointTrack, RotationTrack, clock_offset,
     clock_offset_of_point,
 };
-use calib_finding::{About, Finding, catalog};
+use calib_finding::{About, Fact, Finding, catalog, number};
 use calib_profile::{BodyKind, RecordingSpec, Timing};
 use calib_recording::{Filled, Poses, Recording};
 use calib_urdf::LinkId;
@@ -100,7 +100,8 @@ pub fn with_robot_rows(tracker: Recording, robot: Recording) -> Result<Recording
 }
 
 /// The time line with most samples among those of markers and bodies.
-pub(crate) fn tracker_timeline(recording: &Recording) -> Option<usize> {
+#[must_use]
+pub fn tracker_timeline(recording: &Recording) -> Option<usize> {
     let markers = recording.markers.iter().map(|m| m.timeline);
     let bodies = recording.bodies.iter().map(|b| b.timeline);
     markers.chain(bodies).max_by_key(|&line| {
@@ -201,7 +202,41 @@ pub(crate) fn estimate(
         }
     }
     let outcomes = if turning.is_empty() { moving } else { turning };
-    best(outcomes)
+    best(outcomes).map_err(|why| {
+        let short = why.facts.get("kind").and_then(Fact::word) == Some("too_short");
+        let apart = short.then(|| apart(table, joints, timing.max_offset));
+        apart.flatten().map_or(why, Box::new)
+    })
+}
+
+/// Offsets (s) at which tracker and robot have half of the shorter recording in common, least and largest; `None`: one has no times.
+#[must_use]
+pub fn overlapping_offsets(
+    tracker: &[f64],
+    joints: &BTreeMap<String, Scalars>,
+) -> Option<(f64, f64)> {
+    let longest = joints.values().max_by_key(|j| j.t.len())?;
+    let ends = |t: &[f64]| Some((*t.first()?, *t.last()?));
+    let (a, b) = (ends(tracker)?, ends(&longest.t)?);
+    let half = 0.5 * (a.1 - a.0).min(b.1 - b.0);
+    Some((a.0 - b.1 + half, a.1 - b.0 - half))
+}
+
+/// The clocks are further apart than is looked for.
+fn apart(table: &Poses, joints: &BTreeMap<String, Scalars>, searched: f64) -> Option<Finding> {
+    let (least, most) = overlapping_offsets(table.t.as_deref()?, joints)?;
+    if least <= searched && most >= -searched {
+        return None;
+    }
+    let seconds = |t: f64| Fact::name(format!("{} s", number::fixed(t, 1)));
+    let needed = least.abs().max(most.abs()).ceil();
+    Some(
+        Finding::of_kind(catalog::CLOCK_LAG, "apart", About::Clocks)
+            .with("searched", seconds(searched))
+            .with("least", seconds(least))
+            .with("most", seconds(most))
+            .with("needed", Fact::name(format!("{needed:.0}"))),
+    )
 }
 
 /// The answer with the smallest σ, or the most telling refusal.

@@ -11,6 +11,8 @@ mod rest;
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use calib_urdf::range::resting_positions;
+
 use crate::candidates::{Candidate, Counts};
 use crate::error::PlanError;
 use crate::known::Known;
@@ -79,7 +81,7 @@ pub struct Follow<'a> {
 #[must_use]
 pub fn options(plan: &PlanFile, known: &Known, sigma: Option<f64>) -> Options {
     let model = &known.robot.model;
-    let base = model.zero_positions();
+    let base = resting_positions(model);
     let task = plan.asked.task.iter();
     let task: Vec<Vec<f64>> = task.map(|q| plan.at(model, &base, q)).collect();
     Options {

@@ -1,5 +1,6 @@
 //! Designs, candidates, orders and whole plans.
 
+mod cell;
 mod design;
 mod follow;
 mod plans;

@@ -116,11 +116,14 @@ fn profile(last: usize, seen: Seen, extra: &str) -> String {
 
 /// A robot of the test, as the program would read it.
 pub fn robot(joints: &[JointLine], seen: Seen, shapes: bool, extra: &str) -> RobotProfile {
-    let urdf_text = urdf(joints, shapes);
-    let text = profile(joints.len(), seen, extra);
+    of_text(urdf(joints, shapes), &profile(joints.len(), seen, extra))
+}
+
+/// A robot from the texts of its files.
+pub fn of_text(urdf_text: String, text: &str) -> RobotProfile {
     let model = RobotModel::from_urdf_text(&urdf_text, "arm.urdf").expect("a robot");
-    let raw = calib_profile::parse(&text, "arm.yaml").unwrap_or_else(|e| panic!("{e}"));
-    let profile = calib_profile::check(&raw, &text, "arm.yaml", &model);
+    let raw = calib_profile::parse(text, "arm.yaml").unwrap_or_else(|e| panic!("{e}"));
+    let profile = calib_profile::check(&raw, text, "arm.yaml", &model);
     let profile = profile.unwrap_or_else(|e| panic!("{e}"));
     RobotProfile {
         file: "arm.yaml".to_owned(),

@@ -12,8 +12,8 @@ pub struct RawRobot {
     pub name: String,
     /// URDF file, relative to the profile.
     pub urdf: String,
-    /// Folders of the packages that the URDF's meshes name (`package://<name>/…`), relative to the profile, by name. Only for
-    /// the picture; packages that lie around the URDF are found without it.
+    /// Folders of the packages that the URDF's meshes name (`package://<name>/…`), relative to the profile, by name. For
+    /// the picture and the collisions of a plan; packages that lie around the URDF are found without it.
     #[serde(default)]
     pub packages: BTreeMap<String, String>,
     /// Direction of gravity in the frame of the robot's root; its length does not matter. `[0, 0, -1]` when absent: the root

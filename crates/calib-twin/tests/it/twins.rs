@@ -48,7 +48,17 @@ fn a_twin_that_was_stopped_goes_on_to_the_same_bytes_whatever_the_threads() {
         seed: 2,
         ..options(10, 1, true)
     };
-    assert!(twin(&session, Source::Recordings, &other, &|_, _| {}).is_err());
+    let refused = twin(&session, Source::Recordings, &other, &|_, _| {}).expect_err("another seed");
+    let said = refused.to_string();
+    assert!(said.contains("another session: `--seed` differs"), "{said}");
+    let elsewhere = self::session(5);
+    let options = options(10, 1, true);
+    let refused = twin(&elsewhere, Source::Recordings, &options, &|_, _| {});
+    let said = refused.expect_err("other rows").to_string();
+    assert!(
+        said.contains("the postures of `poses` (recorded or planned)"),
+        "{said}"
+    );
     let screen = terminal::summary(&whole, "out");
     assert!(screen.lines().count() <= 24, "{screen}");
     let schema = write::json_schema();

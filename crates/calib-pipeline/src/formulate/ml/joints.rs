@@ -14,7 +14,7 @@ use crate::prepare::inputs::Inputs;
 use crate::prepare::loads::Loads;
 
 /// Joint noise that estimation starts from, rad (0.01°).
-const JOINT_SIGMA: f64 = 1.7e-4;
+pub const JOINT_SIGMA: f64 = 1.7e-4;
 /// A revolute joint that moves less than this in the fitted recordings did not move, rad.
 const MOVED: f64 = 1e-3;
 

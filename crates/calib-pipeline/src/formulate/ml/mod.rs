@@ -28,6 +28,7 @@ mod widths;
 
 pub(crate) use calibration::calibration;
 pub use calibration::calibration_at;
+pub use joints::JOINT_SIGMA;
 pub(crate) use joints::{moves, used_joints};
 
 /// States the problem of a profile.

@@ -45,7 +45,7 @@ impl Rows<'_> {
         let expected = if cell.contains(',') {
             "a number with a decimal point (a column map can say `decimal_comma: true`)"
         } else {
-            "a number, or nothing where the sample was lost"
+            "a number, or nothing where the sample was lost (a column map can name a text for that: `columns: {lost: [TEXT]}`)"
         };
         Err((self.at(line, column), not_a_number(cell, kind, expected)))
     }

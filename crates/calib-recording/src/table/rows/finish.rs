@@ -6,6 +6,7 @@ use crate::model::{
     BodyStream, JointStream, MarkerSample, MarkerStream, Meta, Recording, TemperatureStream,
     TorqueStream,
 };
+use crate::placeholder::{equal, repeated, repeated_finding};
 use calib_finding::{Fact, Finding, Subject, catalog};
 
 impl Rows<'_> {
@@ -27,7 +28,7 @@ impl Rows<'_> {
                 .iter_mut()
                 .for_each(|stream| stream.resize(n, None));
         }
-        let findings = self.findings();
+        let mut findings = self.findings();
         let timed = self.layout.time.is_some();
         self.timeline.clock = if timed { "t_s" } else { "static poses" }.to_string();
         self.timeline.t = timed.then_some(self.times);
@@ -55,6 +56,21 @@ impl Rows<'_> {
                 .map(|plan| plan.name.clone())
                 .collect(),
         );
+        let codes = repeated(&self.markers);
+        for (name, track) in marker_names.iter().zip(&mut self.markers) {
+            for code in &codes {
+                let mut rows = Vec::new();
+                for (sample, row) in track.iter_mut().zip(&self.timeline.rows) {
+                    if equal(sample) == Some(*code) {
+                        *sample = MarkerSample::Lost;
+                        rows.push(*row);
+                    }
+                }
+                if !rows.is_empty() {
+                    findings.push(repeated_finding(name, *code, rows));
+                }
+            }
+        }
         Ok(Recording {
             meta: Meta {
                 conversions: self.layout.conversions,
