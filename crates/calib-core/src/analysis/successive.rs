@@ -72,7 +72,7 @@ mod tests {
 
     /// K over that without memory.
     fn ratio(shares: &[DVector<f64>]) -> f64 {
-        let plain: f64 = shares.iter().map(|s| s.norm_squared()).sum();
+        let plain: f64 = shares.iter().map(DVector::norm_squared).sum();
         clustered(shares, 2).trace() / plain
     }
 

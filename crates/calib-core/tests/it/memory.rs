@@ -156,7 +156,8 @@ fn a_bump_is_named_beside_memory() {
         bump: 0.5e-3,
         ..STATIC
     };
-    for (rows, robots) in [(long, 4), (held, 4), (independent, 12)] {
+    let (mut z2, mut count) = (0.0, 0.0);
+    for (rows, robots) in [(long, 6), (held, 6), (independent, 12)] {
         for seed in 0..robots {
             let solution = fit(seed, rows);
             let scan = solution.changes(&ChangeSettings::default());
@@ -164,6 +165,14 @@ fn a_bump_is_named_beside_memory() {
             let change = scan.significant().expect("a bump");
             let moved = matches!(change.moved, Moved::Reference(_) | Moved::Drift(_));
             assert!(moved, "{seed}: {change:?}");
+            if rows.count > STATIC.count && matches!(change.moved, Moved::Reference(_)) {
+                let length = Vector3::from_column_slice(&change.jump[3..]).norm();
+                let sigma = Vector3::from_column_slice(&change.sigma[3..]).norm();
+                z2 += ((length - rows.bump) / sigma).powi(2);
+                count += 1.0;
+            }
         }
     }
+    // ± of rows that were taken for independent was 4 to 5 times too small.
+    assert!(count > 6.0 && z2 / count < 3.0, "{}", z2 / count);
 }

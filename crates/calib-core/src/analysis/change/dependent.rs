@@ -24,6 +24,7 @@ use super::chance::Chance;
 use super::columns::Pattern;
 use super::exact::Scanned;
 use super::sums::Found;
+use crate::analysis::dependence::Dependence;
 use crate::analysis::solution::Solution;
 use crate::solve::equations::Workspace;
 use crate::solve::whitened::{Whitened, whitened};
@@ -55,16 +56,20 @@ impl Solution {
         let memory = self.dependence_beside(seen.scanned.borders, &|sample, rows, work| {
             left.beside_change(sample, rows, work);
         });
-        let memory = memory.filter(|memory| memory.is_significant());
-        memory.map_or(1.0, |memory| memory.of_sums())
+        let memory = memory.filter(Dependence::is_significant);
+        memory.as_ref().map_or(1.0, Dependence::of_sums)
     }
 
-    /// The largest T of a candidate by chance where it is `largest` without memory: equation (3).
-    pub(super) fn largest_in_blocks(&self, seen: &Seen<'_>, chance: &Chance, largest: f64) -> f64 {
-        let blocks = Left::of(self, seen).of_blocks(chance.quantiles[seen.candidate]);
-        let under = |(m, freedom)| m * freedom * f64::exp_m1(largest / freedom);
-        blocks.into_iter().map(under).fold(largest, f64::max)
+    /// The variance of sums over blocks of samples beside a change, over what it is without memory, and its degrees of freedom: m and ν of equation (2), where
+    /// they show more than chance.
+    pub(super) fn memory_in_blocks(&self, seen: &Seen<'_>, chance: &Chance) -> Vec<(f64, f64)> {
+        Left::of(self, seen).of_blocks(chance.quantiles[seen.candidate])
     }
+}
+
+/// T of equation (3).
+pub(super) fn in_blocks(largest: f64, (m, freedom): (f64, f64)) -> f64 {
+    m * freedom * (largest / freedom).exp_m1()
 }
 
 /// What the fit leaves beside the change: equation (1).

@@ -31,7 +31,7 @@ mod scatter;
 mod sums;
 
 use std::cmp::Ordering;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use serde::{Deserialize, Serialize};
 
@@ -39,7 +39,7 @@ use crate::analysis::solution::Solution;
 use crate::graph::ids::{EdgeId, FrameId};
 use chance::Chance;
 use columns::Candidates;
-use dependent::Seen;
+use dependent::{Seen, in_blocks};
 use exact::{Scanned, turned};
 use levels::{Best, Levels};
 pub use scatter::{BesideScatter, Left, Scatter};
@@ -113,7 +113,7 @@ pub struct Change {
     pub explains: f64,
     /// ĉ of equation (2).
     pub jump: Vec<f64>,
-    /// Its standard deviations, for noise as found.
+    /// Its standard deviations, for noise as found and the memory that successive samples show beside it.
     pub sigma: Vec<f64>,
 }
 
@@ -258,23 +258,22 @@ impl Solution {
         changes.sort_by(by_excess);
     }
 
-    /// Where something seems to have changed: the chance of that under the memory of the noise.
+    /// Where something seems to have changed: the chance of that under the memory of the noise. How many times as large the variance of what was asked is.
     fn raise_for_memory(
         &self,
         changes: &mut [(usize, Change)],
         found: &[Option<Best>],
         scanned: &Scanned<'_>,
         chance: &mut Chance,
-    ) {
+    ) -> BTreeMap<usize, f64> {
         let without = chance.clone();
-        let largest = |k: usize| without.quantiles[k] + without.threshold;
+        let mut memory = BTreeMap::new();
         let mut least = f64::INFINITY;
-        let mut asked = BTreeSet::new();
         while let Some((k, first)) = changes.first()
             && first.excess > chance.threshold
             && let Some(best) = found[*k].as_ref().filter(|best| best.level == 0)
             && turned(first.moved, &best.found.jump, self) < FAR
-            && asked.insert(*k)
+            && !memory.contains_key(k)
         {
             // Each is asked beside itself: a change is no memory, and is one beside another.
             let seen = Seen {
@@ -283,21 +282,24 @@ impl Solution {
                 found: &best.found,
             };
             let k = seen.candidate;
-            let factor = if asked.len() <= ASKED {
+            let factor = if memory.len() < ASKED {
                 self.memory_beside_change(&seen)
             } else {
                 least
             };
             least = least.min(factor);
-            let under = factor * largest(k) - chance.threshold;
-            chance.quantiles[k] = chance.quantiles[k].max(under);
-            let under = self.largest_in_blocks(&seen, &without, largest(k)) - chance.threshold;
-            chance.quantiles[k] = chance.quantiles[k].max(under);
+            let blocks = self.memory_in_blocks(&seen, &without);
+            let largest = without.quantiles[k] + without.threshold;
+            let under = blocks.iter().map(|of| in_blocks(largest, *of));
+            let under = under.fold(factor * largest, f64::max);
+            chance.quantiles[k] = chance.quantiles[k].max(under - chance.threshold);
+            memory.insert(k, blocks.iter().fold(factor, |most, (m, _)| most.max(*m)));
             for (k, change) in changes.iter_mut() {
                 change.excess = change.score - chance.quantiles[*k];
             }
             changes.sort_by(by_excess);
         }
+        memory
     }
 
     fn scan(&self, settings: &ChangeSettings) -> Option<ChangeScan> {
@@ -343,8 +345,12 @@ impl Solution {
             borders,
             design,
         };
-        self.raise_for_memory(&mut changes, &found, &scanned, &mut chance);
+        let memory = self.raise_for_memory(&mut changes, &found, &scanned, &mut chance);
         self.refine(&mut changes, &found, &scanned, &chance);
+        for (k, change) in &mut changes {
+            let wider = memory.get(k).map_or(1.0, |memory| memory.sqrt());
+            change.sigma.iter_mut().for_each(|sigma| *sigma *= wider);
+        }
         Some(ChangeScan {
             changes: changes.into_iter().map(|(_, c)| c).collect(),
             threshold: chance.threshold,

@@ -12,6 +12,7 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 use super::{Candidate, ScoreTest, tries};
+use crate::analysis::dependence::Dependence;
 use crate::analysis::solution::Solution;
 use crate::solve::whitened::covariance_of;
 
@@ -68,7 +69,7 @@ impl Solution {
             let own = self.effect_rows(effects, sample, &rows.blocks, rows.w.len(), work);
             rows.w += rows.a.times_vector(&step) + &rows.l_inverse * (own * &estimates);
         });
-        let memory = memory.filter(|memory| memory.is_significant());
-        memory.map(|memory| memory.of_sums())
+        let memory = memory.filter(Dependence::is_significant);
+        memory.as_ref().map(Dependence::of_sums)
     }
 }
