@@ -329,7 +329,7 @@ fn the_shipped_robots_are_found_again_from_their_tables() {
             [
                 ("linkM", "upper_arm"),
                 ("gripM", "gripper"),
-                ("table", "table"),
+                ("table_markers", "table"),
             ]
             .as_slice(),
         ),
