@@ -32,7 +32,7 @@ use crate::solve::whitened::{Whitened, whitened};
 /// Counts of blocks that the samples are cut into. More blocks show their variance better, fewer a longer memory.
 const BLOCKS: [usize; 3] = [48, 24, 12];
 /// Samples in a block, at least.
-const LEAST: usize = 2;
+const LEAST: usize = 4;
 /// m is more than chance from so many of its standard deviations on.
 const SHOWN: f64 = 3.0;
 /// What the parameters and a change leave of the sums of blocks, at least, for m to be known.

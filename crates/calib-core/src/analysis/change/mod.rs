@@ -292,8 +292,12 @@ impl Solution {
             let largest = without.quantiles[k] + without.threshold;
             let under = blocks.iter().map(|of| in_blocks(largest, *of));
             let under = under.fold(factor * largest, f64::max);
-            chance.quantiles[k] = chance.quantiles[k].max(under - chance.threshold);
             memory.insert(k, blocks.iter().fold(factor, |most, (m, _)| most.max(*m)));
+            if first.score > under {
+                // It stands out beside memory as well; others are compared with it as without.
+                break;
+            }
+            chance.quantiles[k] = chance.quantiles[k].max(under - chance.threshold);
             for (k, change) in changes.iter_mut() {
                 change.excess = change.score - chance.quantiles[*k];
             }
