@@ -364,6 +364,12 @@ fn rigid(urdf: &str, a: &str, b: &str) -> bool {
     group(a) == group(b)
 }
 
+/// A plan of few postures.
+fn small_plan(profile: &str) -> [&str; 8] {
+    let [poses, candidates, out] = ["--poses", "--candidates", "--out"];
+    ["plan", profile, poses, "8", candidates, "128", out, "plan"]
+}
+
 #[test]
 fn from_a_urdf_alone_to_a_plan_and_a_run() {
     let urdf = std::fs::read(root().join("robots/ripley/r17.urdf")).expect("committed");
@@ -376,16 +382,7 @@ fn from_a_urdf_alone_to_a_plan_and_a_run() {
         "{}",
         made.stdout
     );
-    let plan = dir.calib([
-        "plan",
-        profile,
-        "--poses",
-        "8",
-        "--candidates",
-        "128",
-        "--out",
-        "plan",
-    ]);
+    let plan = dir.calib(small_plan(profile));
     assert_eq!(plan.code, 0, "{}", plan.stderr);
     let simulated = dir.calib(["simulate", profile, "--out", "robots/ripley"]);
     assert_eq!(simulated.code, 0, "{}", simulated.stderr);
@@ -421,16 +418,7 @@ fn postures_that_nothing_asks_for_are_within_all_limits() {
     };
     let profile = "robots/cell.yaml";
     done(&["init", "cell.urdf", "--markers-on", "a3_l"]);
-    done(&[
-        "plan",
-        profile,
-        "--poses",
-        "8",
-        "--candidates",
-        "128",
-        "--out",
-        "plan",
-    ]);
+    done(&small_plan(profile));
     for plan in [None, Some("plan/plan.yaml")] {
         let mut call = vec!["simulate", profile, "--out", "robots/cell"];
         call.extend(plan.iter().flat_map(|plan| ["--plan", plan]));

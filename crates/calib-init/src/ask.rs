@@ -283,8 +283,10 @@ fn of_signs(scene: &Scene<'_>, assigned: &Assigned) -> Option<(Signs, f64)> {
         _ => return None,
     };
     let too_much = outcome.expected.is_some_and(|e| left > e.limit);
-    let signs = signs::search(scene, assigned).filter(|_| of_signs && too_much)?;
-    Some((signs, left))
+    if !(of_signs && too_much) {
+        return None;
+    }
+    Some((signs::search(scene, assigned)?, left))
 }
 
 /// Corrections applied one after the other.

@@ -53,7 +53,7 @@ pub fn bodies(model: &RobotModel, sources: &[Source]) -> (Vec<Found>, Vec<Fact>)
     {
         let mut markers: Vec<String> = group.iter().map(|m| names[*m].clone()).collect();
         let of_group: Vec<&[Option<Point3<f64>>]> = group.iter().map(|m| slices[*m]).collect();
-        let name = free(unlike_links(model, body_name(&markers)), &mut taken);
+        let name = free(model, body_name(&markers), &mut taken);
         let place = Place::Body(name.clone());
         let about = if markers.len() < 3 {
             About::Points {
@@ -217,9 +217,12 @@ pub(crate) fn unlike_links(model: &RobotModel, mut name: String) -> String {
     name
 }
 
-fn free(base: String, taken: &mut BTreeSet<String>) -> String {
+/// The name, or the next one like it, that neither a body nor a link has.
+fn free(model: &RobotModel, base: String, taken: &mut BTreeSet<String>) -> String {
+    let base = unlike_links(model, base);
     let mut names = std::iter::once(base.clone()).chain((2..).map(|n| format!("{base}_{n}")));
-    let name = names.find(|name| !taken.contains(name)).unwrap_or(base);
+    let is_free = |name: &String| !taken.contains(name) && model.link_id(name).is_err();
+    let name = names.find(is_free).unwrap_or(base);
     taken.insert(name.clone());
     name
 }
@@ -241,7 +244,7 @@ pub fn split(
         }
         facts.retain(|fact| fact.place != Place::Body(body.name.clone()));
         for marker in body.markers {
-            let name = free(unlike_links(model, marker.clone()), &mut taken);
+            let name = free(model, marker.clone(), &mut taken);
             let about = About::Points { markers: 1 };
             facts.push(Fact::new(Place::Body(name.clone()), about));
             new.push(Found {
@@ -324,16 +327,19 @@ mod tests {
 
     #[test]
     fn names_come_from_what_the_markers_share() {
+        let urdf = "<robot name=\"r\"><link name=\"table\"/></robot>";
+        let model = RobotModel::from_urdf_text(urdf, "r.urdf").expect("a robot");
         let mut taken = BTreeSet::new();
         let named = |markers: &[&str], taken: &mut BTreeSet<String>| {
             let markers: Vec<String> = markers.iter().map(|m| (*m).to_owned()).collect();
-            free(body_name(&markers), taken)
+            free(&model, body_name(&markers), taken)
         };
         assert_eq!(named(&["gripM_1", "gripM_2"], &mut taken), "gripM");
         assert_eq!(named(&["m1", "m2", "m3"], &mut taken), "body");
         assert_eq!(named(&["a", "b"], &mut taken), "body_2");
         assert_eq!(named(&["left_marker"], &mut taken), "left_marker");
         assert_eq!(named(&["Sub:P1", "Sub:P2"], &mut taken), "Sub");
+        assert_eq!(named(&["table_1", "table_2"], &mut taken), "table_markers");
     }
 
     #[test]

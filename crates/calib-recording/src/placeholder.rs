@@ -96,7 +96,7 @@ impl Placeholders {
     pub(crate) fn findings(&mut self) -> Vec<Finding> {
         let all = std::mem::take(&mut self.0).into_iter();
         all.map(|(name, rows)| {
-            Finding::new(catalog::PLACEHOLDER_TRIPLET, Subject::marker(name))
+            Finding::of_kind(catalog::PLACEHOLDER_TRIPLET, "known", Subject::marker(name))
                 .with("samples", Fact::count(rows.len()))
                 .at_rows(rows)
         })

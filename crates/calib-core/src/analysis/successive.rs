@@ -15,8 +15,11 @@ use nalgebra::{DMatrix, DVector};
 const BLOCKS: [usize; 2] = [48, 24];
 /// Samples in a block, at least.
 const LEAST: usize = 2;
-/// m is more than chance from so many of its standard deviations on.
-const SHOWN: f64 = 3.0;
+
+/// Whether m, which has so many degrees of freedom, is more than chance makes it: 3 of its standard deviations above 1.
+pub(crate) fn is_shown(m: f64, freedom: f64) -> bool {
+    m > 1.0 + 3.0 * (2.0 / freedom).sqrt()
+}
 
 /// K of equation (1) times m, where that shows more than chance.
 pub(crate) fn clustered(shares: &[DVector<f64>], r: usize) -> DMatrix<f64> {
@@ -46,7 +49,7 @@ fn memory(shares: &[DVector<f64>], k: &DMatrix<f64>) -> f64 {
         };
         let n = blocks as f64;
         let m = (0..blocks).map(energy).sum::<f64>() / (rank * (1.0 - 1.0 / n));
-        (m > 1.0 + SHOWN * (2.0 / (rank * n)).sqrt()).then_some(m)
+        is_shown(m, rank * n).then_some(m)
     };
     BLOCKS.into_iter().filter_map(of).fold(1.0, f64::max)
 }

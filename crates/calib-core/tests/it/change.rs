@@ -1,7 +1,7 @@
 //! A body that slips, a tracker that is bumped, an encoder that jumps: found, at the right row, and not where nothing moved.
 
 use crate::common::{Chain, Free, Handles, normal3, rng, six_r};
-use calib_core::{Change, ChangeScan, ChangeSettings, Moved, NoiseKind, Settings, Solution, solve};
+use calib_core::{Change, ChangeScan, ChangeSettings, Moved, Settings, Solution, solve};
 use nalgebra::{Isometry3, Translation3};
 use rand::RngExt;
 
@@ -93,12 +93,7 @@ fn case_with(seed: u64, design: Design, event: Event, fitted: Fitted) -> Case {
     }
     let mut h = chain.problem(&free, SIGMA);
     h.problem.group_mut(h.markers).estimate = true;
-    let noise = h
-        .problem
-        .noise_group("joints", NoiseKind::Joint, JOINT, true);
-    for joint in h.joints.clone() {
-        h.problem.joint_noise(joint, noise);
-    }
+    h.scattering_joints(JOINT);
     let direction = normal3(&mut r).normalize();
     let shift = |m: f64| {
         Isometry3::from_parts(

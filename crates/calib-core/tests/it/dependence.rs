@@ -42,12 +42,7 @@ fn case_of(free: Free, seen: Seen, (seed, factor): (u64, f64), poses: usize, rho
         .deviate(&mut r, &free, 0.005, 0.002);
     let mut h = chain.problem(&free, SIGMA);
     h.problem.group_mut(h.markers).estimate = true;
-    let noise = h
-        .problem
-        .noise_group("joints", NoiseKind::Joint, JOINT, true);
-    for joint in h.joints.clone() {
-        h.problem.joint_noise(joint, noise);
-    }
+    h.scattering_joints(JOINT);
     let mut state: Vec<Vector3<f64>> = chain.markers.iter().map(|_| normal3(&mut r)).collect();
     let (mut markers, mut bodies) = (Vec::new(), Vec::new());
     for (sample, q) in chain.q.iter().enumerate() {

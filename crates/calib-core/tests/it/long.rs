@@ -1,9 +1,7 @@
 //! Recordings of many samples: a fit begins with some of them and tests look at some of them, and nothing that matters is lost by it.
 
 use crate::common::{Chain, Free, Handles, normal, normal3, rng, six_r};
-use calib_core::{
-    ChangeSettings, MarkerObservation, Moved, NoiseKind, Settings, Solution, solve, solve_some,
-};
+use calib_core::{ChangeSettings, MarkerObservation, Moved, Settings, Solution, solve, solve_some};
 use nalgebra::{Point3, Translation3, Vector3};
 use rand::RngExt;
 
@@ -49,12 +47,7 @@ fn case(seed: u64, has: Has) -> Case {
     h.problem.group_mut(h.markers).estimate = true;
     h.problem.borders = vec![SHORT];
     if has.joint_noise {
-        let noise = h
-            .problem
-            .noise_group("joints", NoiseKind::Joint, JOINT, true);
-        for joint in h.joints.clone() {
-            h.problem.joint_noise(joint, noise);
-        }
+        h.scattering_joints(JOINT);
     }
     let mount = chain.true_mount;
     let (mut seen, mut gross) = (Vec::new(), Vec::new());

@@ -26,12 +26,7 @@ fn draw(seed: u64, poses: usize, joint_noise: f64, model_joint: bool, outliers: 
     let mut h = chain.problem(&free, MARKER);
     h.problem.group_mut(h.markers).estimate = true;
     if model_joint {
-        let g = h
-            .problem
-            .noise_group("joints", NoiseKind::Joint, 1e-3, true);
-        for j in &h.joints {
-            h.problem.joint_noise(*j, g);
-        }
+        h.scattering_joints(1e-3);
     }
     chain.observe(&mut r, &mut h, MARKER, joint_noise);
     if outliers > 0.0 {

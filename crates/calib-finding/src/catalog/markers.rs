@@ -12,7 +12,7 @@ super::topic! {
     }
     /// Samples whose three coordinates are one number that stands for nothing.
     PLACEHOLDER_TRIPLET = "placeholder-triplet" {
-        "": Warning,
+        "known": Warning,
             "{samples:sample} whose coordinates are all the same number, one that stands for a lost sample; taken as lost.",
             "Export lost samples as empty.";
         "repeated": Warning,

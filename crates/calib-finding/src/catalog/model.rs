@@ -115,8 +115,8 @@ super::topic! {
             "Tracker and robot have too few samples in common.",
             "Record at least several seconds with both clocks running.";
         "apart": Error,
-            "The times of tracker and robot have too little in common: offsets up to {searched} are looked for, and those at which the recordings overlap are from {least} to {most}.",
-            "If they were recorded together, set `timing: {max_offset_s: {needed}}` for the recording; it is looked for in between then.";
+            "The times of tracker and robot have too little in common: offsets of up to {searched:s} are looked for, and the recordings overlap at offsets from {least:s} to {most:s}.",
+            "If they were recorded together, set `timing: {max_offset_s: {needed}}` for the recording: the offset is then looked for up to there.";
     }
     /// Quaternions in another order.
     QUATERNION_ORDER = "quaternion-order" {

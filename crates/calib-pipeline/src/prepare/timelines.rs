@@ -8,7 +8,7 @@ use calib_checks::sync::{
     ClockMap, LinkTrack, OffsetOutcome, OffsetSettings, PointTrack, RotationTrack, clock_offset,
     clock_offset_of_point,
 };
-use calib_finding::{About, Fact, Finding, catalog, number};
+use calib_finding::{About, Fact, Finding, catalog};
 use calib_profile::{BodyKind, RecordingSpec, Timing};
 use calib_recording::{Filled, Poses, Recording};
 use calib_urdf::LinkId;
@@ -228,14 +228,13 @@ fn apart(table: &Poses, joints: &BTreeMap<String, Scalars>, searched: f64) -> Op
     if least <= searched && most >= -searched {
         return None;
     }
-    let seconds = |t: f64| Fact::name(format!("{} s", number::fixed(t, 1)));
     let needed = least.abs().max(most.abs()).ceil();
     Some(
         Finding::of_kind(catalog::CLOCK_LAG, "apart", About::Clocks)
-            .with("searched", seconds(searched))
-            .with("least", seconds(least))
-            .with("most", seconds(most))
-            .with("needed", Fact::name(format!("{needed:.0}"))),
+            .with("searched", Fact::seconds(searched))
+            .with("least", Fact::seconds(least))
+            .with("most", Fact::seconds(most))
+            .with("needed", Fact::count(needed as usize)),
     )
 }
 

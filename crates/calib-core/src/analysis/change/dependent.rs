@@ -5,15 +5,16 @@
 //!
 //! ```text
 //! δ = −C (Σ Aᵀw + E ĉ),   r_s = w_s + A_s δ + B̃_s ĉ f_s,   U_b = Σ_{s∈b} B̃ᵀ r                          (1)
-//! m = Σ_b U_bᵀ G⁻¹ U_b / (s² d (1 − t)),   t = tr(G⁻¹ Σ_b E_bᵀ C E_b) / d + T_q / (d n)                  (2)
-//! T_γ ← ν m (exp(T_γ / ν) − 1),   ν = d n (1 − t)                                                       (3)
+//! M = Σ_b Wᵀ U_b U_bᵀ W / (s² (1 − t)),   G⁻¹ = W Wᵀ,   t = tr(G⁻¹ Σ_b E_bᵀ C E_b) / d + T_q / (d n)      (2)
+//! T_γ ← ν m (exp(T_γ / ν) − 1),   h = (tr M)² / tr M²,   m = tr M / h,   ν = h n (1 − t)                 (3)
 //! T_γ ← T_γ κ (1 + 2 c ρ / (1 − ρ))                                                                      (4)
 //! ```
 //!
 //! f_s is how much of the change holds in a sample, s² the mean square of r, and d the rank of G = Σ B̃ᵀB̃. Without memory the sums over n blocks of
-//! successive samples have the variance of the samples, but for the part t that the parameters take and that a change takes which is the best of many,
-//! T_q. m is how much more they have, whatever it comes from, and ν how well that is known: (3) is what F of ν degrees of freedom is to χ² (Künsch
-//! 1989 for the blocks). (4) has the memory c ρ^l that r shows from one sample to the next ([`Dependence`](crate::Dependence)), which fewer samples
+//! successive samples have the variance of the samples, M = 1, but for the part t that the parameters take and that a change takes which is the best of
+//! many, T_q. M is how much more they have in each direction, whatever it comes from; a sum of squares of such sums is m times a χ² of h degrees of freedom
+//! (Satterthwaite 1946), and as m is known from ν of them, (3) is what F is to χ² (Künsch 1989 for the blocks). (4) has the memory c ρ^l that r shows from
+//! one sample to the next ([`Dependence`](crate::Dependence)), which fewer samples
 //! show. What asks for the larger T decides.
 
 use calib_geometry::decompose::symmetric_eigen;
@@ -26,15 +27,14 @@ use super::exact::Scanned;
 use super::sums::Found;
 use crate::analysis::dependence::Dependence;
 use crate::analysis::solution::Solution;
+use crate::analysis::successive::is_shown;
 use crate::solve::equations::Workspace;
 use crate::solve::whitened::{Whitened, whitened};
 
 /// Counts of blocks that the samples are cut into. More blocks show their variance better, fewer a longer memory.
 const BLOCKS: [usize; 3] = [48, 24, 12];
-/// Samples in a block, at least.
+/// Samples in a block, at least: of 40 poses in blocks of three, a slip of twice the noise lost to a joint in one of ten recordings.
 const LEAST: usize = 4;
-/// m is more than chance from so many of its standard deviations on.
-const SHOWN: f64 = 3.0;
 /// What the parameters and a change leave of the sums of blocks, at least, for m to be known.
 const LEFT: f64 = 0.5;
 /// A direction with less than this share of a column's information is none.
@@ -60,7 +60,7 @@ impl Solution {
         memory.as_ref().map_or(1.0, Dependence::of_sums)
     }
 
-    /// The variance of sums over blocks of samples beside a change, over what it is without memory, and its degrees of freedom: m and ν of equation (2), where
+    /// The variance of sums over blocks of samples beside a change, over what it is without memory, and its degrees of freedom: m and ν of equation (3), where
     /// they show more than chance.
     pub(super) fn memory_in_blocks(&self, seen: &Seen<'_>, chance: &Chance) -> Vec<(f64, f64)> {
         Left::of(self, seen).of_blocks(chance.quantiles[seen.candidate])
@@ -115,7 +115,7 @@ impl<'a> Left<'a> {
         own.into_owned()
     }
 
-    /// m and ν of equations (2) and (3), for each count of blocks that shows more than chance.
+    /// m and ν of equation (3), for each count of blocks that shows more than chance.
     fn of_blocks(&self, quantile: f64) -> Vec<(f64, f64)> {
         let (samples, design) = (self.seen.scanned.samples, self.seen.scanned.design);
         let (bins, s2) = self.bins();
@@ -123,25 +123,35 @@ impl<'a> Left<'a> {
             return Vec::new();
         };
         let rank = whole.ncols() as f64;
-        let energy = |u: &DVector<f64>| whole.tr_mul(u).norm_squared();
         let of = |blocks: usize| {
             let ends = self.blocks(blocks);
             let count = ends.len() as f64;
-            let (mut sum, mut taken, mut first) = (0.0, 0.0, 0);
+            let mut sums = DMatrix::zeros(whole.ncols(), whole.ncols());
+            let (mut taken, mut first) = (0.0, 0);
             for end in ends {
                 let own = bins[first..end].iter();
-                sum += energy(&own.fold(DVector::zeros(bins[0].len()), |sum, u| sum + u));
-                if let Some((_, fit)) = design.between(self.steps(), (first, end)) {
+                let own = own.fold(DVector::zeros(bins[0].len()), |sum, u| sum + u);
+                let own = whole.tr_mul(&own);
+                sums.ger(1.0, &own, &own, 1.0);
+                if let Some(fit) = design.taken_between(self.steps(), (first, end)) {
                     taken += (whole.tr_mul(&fit) * &whole).trace();
                 }
                 first = end;
             }
             let left = 1.0 - taken / rank - quantile / (rank * count);
-            let freedom = rank * count * left;
-            let known = samples.len() >= LEAST * blocks && left > LEFT;
-            let m = sum / (s2 * rank * left);
-            let shown = m > 1.0 + SHOWN * (2.0 / freedom).sqrt();
-            (known && shown).then_some((m, freedom))
+            if samples.len() < LEAST * blocks || left <= LEFT {
+                return None;
+            }
+            sums /= s2 * left;
+            let (all, squares) = (sums.trace(), sums.norm_squared());
+            if !is_shown(all / rank, rank * count * left) {
+                return None;
+            }
+            // tr M² is larger by chance, as of a Wishart matrix.
+            let n = count * left;
+            let squares = (squares - all * all / n) / (1.0 + 1.0 / n);
+            let directions = (all * all / squares.max(f64::MIN_POSITIVE)).clamp(1.0, rank);
+            Some((all / directions, directions * n))
         };
         BLOCKS.into_iter().filter_map(of).collect()
     }

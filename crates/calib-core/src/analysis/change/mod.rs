@@ -18,8 +18,9 @@
 //!
 //! How large T becomes by chance over all ranges is simulated from the model. Candidates have up to six columns, so
 //! every T counts from its own quantile of that simulation; the largest excess is compared with the quantile of the
-//! largest excess. What one joint that scatters more than the others explains is no change (`scatter`). What it does **not** protect against: physics that is missing in the model and follows the order of the samples, as
-//! in sweeps of one joint after another; [`Solution::goodness_of_fit`] says whether it explains more.
+//! largest excess. What one joint that scatters more than the others explains is no change (`scatter`), nor is what successive samples share
+//! (`dependent`). Physics that is missing in the model and follows the order of the samples, as in sweeps of one joint after another, can still look like
+//! a change: [`Solution::goodness_of_fit`] says whether it explains more.
 
 mod chance;
 pub(crate) mod columns;
@@ -235,6 +236,10 @@ impl Solution {
         let least = changes.first().map_or(0.0, |(_, c)| PART * c.explains);
         for (place, (k, change_of)) in changes.iter_mut().enumerate() {
             let Some(best) = &found[*k] else { continue };
+            // A finer look finds a larger T, by chance too.
+            if change_of.excess <= chance.threshold {
+                continue;
+            }
             let quantile = chance.quantiles[*k];
             let near = match place {
                 0 => self.near(coarse, *k, best),

@@ -212,18 +212,18 @@ impl Design {
         &sums[sums.len() - 1].g
     }
 
-    /// Σ B̃ᵀB̃ of a candidate between two edges, and EᵀCE: what of it the parameters take. `None` for other patterns than steps.
-    pub(super) fn between(
+    /// EᵀCE between two edges: what the parameters take of a candidate. `None` for other patterns than steps.
+    pub(super) fn taken_between(
         &self,
         candidate: usize,
         (from, to): (usize, usize),
-    ) -> Option<(DMatrix<f64>, DMatrix<f64>)> {
+    ) -> Option<DMatrix<f64>> {
         if self.patterns[candidate] != Pattern::Step {
             return None;
         }
         let sums = &self.cumulative[candidate];
         let f = &sums[to].f - &sums[from].f;
-        Some((&sums[to].g - &sums[from].g, f.tr_mul(&f)))
+        Some(f.tr_mul(&f))
     }
 
     /// First sample after a change, and the first that is no longer.

@@ -160,6 +160,18 @@ pub struct Handles {
     pub markers: GroupId,
 }
 
+impl Handles {
+    /// Joints that deviate from their readings in each pose by a σ that is estimated, rad to begin with.
+    pub fn scattering_joints(&mut self, sigma: f64) {
+        let noise = self
+            .problem
+            .noise_group("joints", NoiseKind::Joint, sigma, true);
+        for joint in &self.joints {
+            self.problem.joint_noise(*joint, noise);
+        }
+    }
+}
+
 pub fn square_markers() -> Vec<Point3<f64>> {
     vec![
         Point3::new(0.06, 0.01, 0.0),
