@@ -156,7 +156,7 @@ fn clocks_far_apart_are_brought_together_and_the_profile_says_how_far() {
     let error = tables::tables(&arm(), &without, &drafts, &sources).expect_err("too far");
     let said = error.to_string();
     assert!(
-        said.contains("offsets up to 10.0 s are looked for"),
+        said.contains("offsets of up to 10 s are looked for"),
         "{said}"
     );
     let both = streams(&hand, Motion::Continuous, 2.0, 85);
