@@ -237,6 +237,15 @@ pub enum About {
         /// Their names.
         joints: Vec<String>,
     },
+    /// A joint that carries a body, has no column and cannot stand at 0: taken to stand at the end of its range that is nearest to it.
+    JointAtItsLimit {
+        /// Its name.
+        joint: String,
+        /// Where, rad or m.
+        at: f64,
+        /// Whether it turns.
+        turns: bool,
+    },
     /// The unit of the angles.
     Angles {
         /// The unit.
@@ -474,6 +483,7 @@ fn is_guess(about: &About) -> bool {
         | About::TooFew { .. }
         | About::JointsByOrder { .. }
         | About::JointsMissing { .. }
+        | About::JointAtItsLimit { .. }
         | About::Duplicate { .. }
         | About::LostByNumber { .. }
         | About::FarClocks { .. }

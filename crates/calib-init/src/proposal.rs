@@ -43,8 +43,8 @@ pub struct Recording {
     pub max_offset: Option<f64>,
     /// What it is for.
     pub usage: Use,
-    /// Joints without a column, which are taken to stand at 0.
-    pub hold: Vec<JointId>,
+    /// Joints without a column, and where they are taken to stand, rad or m: at 0, or as near to it as their limits allow.
+    pub hold: Vec<(JointId, f64)>,
 }
 
 /// Noise that the recordings show: standard deviations.

@@ -1,6 +1,7 @@
 //! From a URDF and files to a proposal.
 
 use calib_recording::{LengthUnit, Poses};
+use calib_urdf::range::{range, resting_positions};
 use calib_urdf::{JointId, LinkId, RobotModel, doubt};
 
 use crate::ask::{apply_one, ask, next_correction};
@@ -417,7 +418,7 @@ fn noise(facts: &[Fact]) -> Noise {
     noise
 }
 
-/// Joints that carry a body and have no column are held at 0, and said.
+/// Joints that carry a body and have no column are held at 0 or at the end of their range that is nearest to it, and said.
 fn missing(model: &RobotModel, proposal: &mut Proposal, tables: &[Poses]) -> Vec<Fact> {
     let mut facts = Vec::new();
     let carriers = proposal
@@ -427,22 +428,51 @@ fn missing(model: &RobotModel, proposal: &mut Proposal, tables: &[Poses]) -> Vec
     let mut carriers: Vec<JointId> = carriers.collect();
     carriers.sort_unstable();
     carriers.dedup();
+    let resting = at_rest(model);
     for (recording, poses) in proposal.recordings.iter_mut().zip(tables) {
         let without = carriers
             .iter()
             .filter(|j| !poses.joints.contains_key(&model.joint(**j).name));
         let without: Vec<JointId> = without.copied().collect();
-        if !without.is_empty() {
-            let joints = robot::names(model, &without)
+        let place = || Place::Recording(recording.name.clone());
+        let (at_zero, elsewhere): (Vec<JointId>, Vec<JointId>) =
+            without.iter().partition(|j| resting[j.index()] == 0.0);
+        if !at_zero.is_empty() {
+            let joints = robot::names(model, &at_zero)
                 .iter()
                 .map(|n| (*n).to_owned())
                 .collect();
-            facts.push(Fact::new(
-                Place::Recording(recording.name.clone()),
-                About::JointsMissing { joints },
-            ));
+            facts.push(Fact::new(place(), About::JointsMissing { joints }));
         }
-        recording.hold = without;
+        for &joint in &elsewhere {
+            let about = About::JointAtItsLimit {
+                joint: model.joint(joint).name.clone(),
+                at: resting[joint.index()],
+                turns: model.joint(joint).kind.turns(),
+            };
+            facts.push(Fact::new(place(), about));
+        }
+        recording.hold = without.iter().map(|j| (*j, resting[j.index()])).collect();
     }
     facts
+}
+
+/// Where joints stand that nothing moves, as a profile states it: to a tenth of a degree or millimeter, within their limits.
+fn at_rest(model: &RobotModel) -> Vec<f64> {
+    let mut q = resting_positions(model);
+    for id in model.independent_joints() {
+        let unit = if model.joint(id).kind.turns() {
+            0.1_f64.to_radians()
+        } else {
+            1e-4
+        };
+        // Away from 0, which is beyond the limit.
+        let steps = q[id.index()] / unit;
+        let rounded = steps.abs().ceil().copysign(steps) * unit;
+        let within = range(model, id).is_none_or(|(low, high)| (low..=high).contains(&rounded));
+        if steps != 0.0 && within {
+            q[id.index()] = rounded;
+        }
+    }
+    q
 }

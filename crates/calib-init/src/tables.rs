@@ -28,7 +28,7 @@ use crate::write;
 /// [`InitError::Profile`] where a name in the files is not one that a profile may have.
 pub fn robot_profile(model: &RobotModel, proposal: &Proposal) -> Result<RobotProfile, InitError> {
     let text = write::profile(model, proposal);
-    let file = "profile.yaml";
+    let file = "proposed profile";
     let raw = calib_profile::parse(&text, file)?;
     let profile = calib_profile::check(&raw, &text, file, model)?;
     Ok(RobotProfile {

@@ -6,6 +6,7 @@ use calib_finding::{Unit, number};
 use calib_recording::{AngleUnit, TimeUnit};
 
 use crate::fact::{About, AngleHow, LengthHow, Mistake, Residuals, Rival};
+use crate::yaml;
 
 /// The first lines of a profile.
 pub const HEAD: &str = "Made by `calib init`. Comments state the evidence. Lines with CHECK are guesses: confirm or correct each one, then delete the comment.";
@@ -81,6 +82,7 @@ pub fn sentence(about: &About) -> String {
         About::JointsByName { .. }
         | About::JointsByOrder { .. }
         | About::JointsMissing { .. }
+        | About::JointAtItsLimit { .. }
         | About::Angles { .. }
         | About::Lengths { .. }
         | About::Time { .. }
@@ -207,6 +209,15 @@ fn of_columns(about: &About) -> String {
             if joints.len() == 1 { "has" } else { "have" },
             if joints.len() == 1 { "is" } else { "are" }
         ),
+        About::JointAtItsLimit { joint, at, turns } => {
+            let at = match turns {
+                true => format!("{}°", yaml::number(at.to_degrees(), 1)),
+                false => format!("{} mm", yaml::number(at * 1e3, 1)),
+            };
+            format!(
+                "`{joint}` has no column and cannot stand at 0: it is taken to stand at {at}, the nearest end of its range."
+            )
+        }
         About::Angles { unit, how } => {
             let unit = angle_unit(*unit);
             match how {

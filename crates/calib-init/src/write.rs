@@ -142,12 +142,11 @@ impl Page<'_> {
             Use::Validation => self.line("    use: validation"),
         }
         if !recording.hold.is_empty() {
-            let at_zero = recording
-                .hold
-                .iter()
-                .map(|j| format!("{}: 0", self.key(*j)));
-            let at_zero: Vec<String> = at_zero.collect();
-            self.line(&format!("    hold: {{{}}}", at_zero.join(", ")));
+            let at = |(joint, value): &(JointId, f64)| {
+                format!("{}: {}", self.key(*joint), self.value(*joint, *value))
+            };
+            let at: Vec<String> = recording.hold.iter().map(at).collect();
+            self.line(&format!("    hold: {{{}}}", at.join(", ")));
         }
         if let Some(columns) = &recording.table.columns {
             self.columns("    ", columns, known);

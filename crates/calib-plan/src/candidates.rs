@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use crate::joints::JointBox;
+use crate::known::CameraNoise;
 use crate::scene::{Contact, Scene, rigid_parts};
 use crate::sight::{Seen, Sight, normal};
 
@@ -128,7 +129,10 @@ impl<'a> Feasible<'a> {
         let worst = pairs.into_iter().max_by_key(|(_, count)| *count);
         counts.worst_pair = worst.map(|((a, b), _)| [name(a), name(b)]);
         counts.feasible = kept.len();
-        let factor = normal(kept.iter().flat_map(|c| &c.seen));
+        let factor = match self.sight.noise {
+            CameraNoise::Stated => normal(kept.iter().flat_map(|c| &c.seen)),
+            CameraNoise::Scaled(_) | CameraNoise::Equal => 1.0,
+        };
         for shape in kept
             .iter_mut()
             .flat_map(|c| &mut c.seen)

@@ -7,6 +7,7 @@ use calib_core::Settings;
 use calib_geometry::registration::rigid_registration;
 use calib_pipeline::PipelineError;
 use calib_pipeline::estimate::start::Start;
+use calib_pipeline::formulate::cameras;
 use calib_pipeline::formulate::checked::check_data;
 use calib_pipeline::formulate::formulation::FreeSet;
 use calib_pipeline::formulate::ml;
@@ -45,6 +46,17 @@ pub struct Known {
     pub notes: Vec<Note>,
 }
 
+/// How the noise of markers follows the cameras of the profile.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum CameraNoise {
+    /// So that σ is that of the postures to choose from, on average.
+    Stated,
+    /// By this factor, so that σ is that of the recordings, on average.
+    Scaled(f64),
+    /// Not at all: recordings show it equal in all directions.
+    Equal,
+}
+
 /// Distance of the first marker of an assumed layout from the body's origin, m.
 const LAYOUT: f64 = 0.05;
 
@@ -80,6 +92,24 @@ impl Known {
         Ok(Self::of_profile(robot, notes))
     }
 
+    /// How the noise of markers follows the cameras.
+    #[must_use]
+    pub fn camera_noise(&self) -> CameraNoise {
+        let Some(inputs) = &self.inputs else {
+            return CameraNoise::Stated;
+        };
+        let mut recorded = inputs
+            .recordings
+            .values()
+            .flat_map(|r| r.poses.markers.values());
+        let any = recorded.any(|track| track.iter().any(Option::is_some));
+        match cameras::scale(inputs) {
+            Some(scale) => CameraNoise::Scaled(scale),
+            None if any => CameraNoise::Equal,
+            None => CameraNoise::Stated,
+        }
+    }
+
     /// σ of a joint's reading, rad, and where it is taken from; the largest, where joints have their own.
     #[must_use]
     pub fn joint_noise(&self) -> (f64, JointNoiseOf) {
@@ -102,8 +132,18 @@ impl Known {
         let checked = check_data(&mut inputs, Vec::new(), false)?;
         let mut settings = Settings::default();
         settings.robust.enabled = robot.profile.solve.robust;
-        let stated = ml::state(&inputs, &checked.tracks, &checked.start, FreeSet::Profile);
-        let fit = ml::fit(stated, &inputs, &settings)?;
+        let state =
+            |inputs: &Inputs| ml::state(inputs, &checked.tracks, &checked.start, FreeSet::Profile);
+        let mut fit = ml::fit(state(&inputs), &inputs, &settings)?;
+        // The noise of the cameras, as in a run.
+        if cameras::take(&mut inputs) {
+            let with = ml::fit(state(&inputs), &inputs, &settings)?;
+            if cameras::contradicted(&with, &fit, &settings) {
+                cameras::take_back(&mut inputs);
+            } else {
+                fit = with;
+            }
+        }
         let found = fit.solution.parameters.iter();
         let groups = fit.formulation.problem.groups().iter();
         let levels = groups.zip(&fit.solution.noise);

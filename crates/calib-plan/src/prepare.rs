@@ -12,7 +12,7 @@ use crate::candidates::{Candidate, Counts, Feasible};
 use crate::design::Criterion;
 use crate::error::PlanError;
 use crate::joints::JointBox;
-use crate::known::Known;
+use crate::known::{CameraNoise, Known};
 use crate::linear::Linear;
 use crate::list::{Goal, Parameter};
 use crate::note::Note;
@@ -246,6 +246,10 @@ impl Known {
         let place = self.start.tracker_from_root;
         let mut sight = Sight::new(spec, self.subjects(&moves), place);
         sight.unrecorded = self.unrecorded.clone();
+        sight.noise = self.camera_noise();
+        if let CameraNoise::Scaled(scale) = sight.noise {
+            sight.scale = scale;
+        }
         (Feasible::new(model, joints, scene, sight), unread)
     }
 

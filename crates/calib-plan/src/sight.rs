@@ -11,8 +11,9 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use calib_profile::{Camera, Facing, PlanSpec};
-use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Vector3};
 
+use crate::known::CameraNoise;
 use crate::scene::Scene;
 use crate::shape::Capsule;
 
@@ -48,7 +49,9 @@ pub struct Sight {
     pub tracker_from_root: Isometry3<f64>,
     /// Everything that can be seen.
     pub subjects: Vec<Subject>,
-    /// Factor of equation (2) that brings the mean trace of the candidates to that of the stated σ.
+    /// How (2) is scaled.
+    pub noise: CameraNoise,
+    /// Factor of equation (2) that brings its mean trace to that of σ.
     pub scale: f64,
     /// Bodies and markers that are not recorded: they count as hidden.
     pub unrecorded: BTreeSet<String>,
@@ -66,6 +69,7 @@ impl Sight {
         Self {
             tracker_from_root,
             subjects,
+            noise: CameraNoise::Stated,
             scale: 1.0,
             unrecorded: BTreeSet::new(),
             cameras: spec.cameras.values().cloned().collect(),
@@ -106,10 +110,13 @@ impl Sight {
                     && scene.sees(placed, &eye, (&at, body_of_link[subject.link]));
                 if visible {
                     count += 1;
-                    information += across(&(in_tracker - camera.at));
+                    information += camera.information(&in_tracker);
                 }
             }
-            let shape = || information.try_inverse().map(|m| m * self.scale);
+            let shape = || match self.noise {
+                CameraNoise::Equal => None,
+                _ => information.try_inverse().map(|m| m * self.scale),
+            };
             (count >= self.least).then(shape)
         };
         self.subjects.iter().map(of).collect()
@@ -149,33 +156,10 @@ pub fn normal<'s>(all: impl Iterator<Item = &'s Seen>) -> f64 {
     3.0 * f64::from(count) / sum
 }
 
-/// (1 − d dᵀ)/ρ²; with 1e-3 along the sight, so that one camera gives a covariance, if a long one.
-fn across(sight: &Vector3<f64>) -> Matrix3<f64> {
-    /// Information along the line of sight relative to that across it.
-    const ALONG: f64 = 1e-3;
-    let Some(d) = Unit::try_new(*sight, 1e-9) else {
-        return Matrix3::identity();
-    };
-    let dd = d.into_inner() * d.transpose();
-    (Matrix3::identity() - dd * (1.0 - ALONG)) / sight.norm_squared()
-}
-
 /// Whether the side that is shown looks toward the eye.
 fn shown(facing: Option<&Facing>, root_from_link: &Isometry3<f64>, to_eye: &Vector3<f64>) -> bool {
     facing.is_none_or(|facing| {
         let normal = root_from_link.rotation * facing.normal.into_inner();
         normal.angle(to_eye) <= facing.within
     })
-}
-
-/// A camera's field.
-trait Covers {
-    fn covers(&self, point: &Point3<f64>) -> bool;
-}
-
-impl Covers for Camera {
-    fn covers(&self, point: &Point3<f64>) -> bool {
-        let sight = point - self.at;
-        sight.norm() <= self.range && self.axis.angle(&sight) <= self.half_field
-    }
 }

@@ -5,17 +5,18 @@
 //! ```text
 //! parent_from_joint' = parent_from_joint · exp(ξ),   ξ across the joint's axis          (1)
 //! q_true = q_indicated + offset + c · g(q_indicated) + N(0, σ_q²)                       (2)
-//! marker = tracker_from_root · FK'(q_true) · link_from_body' · p_body + N(0, σ_m² I)     (3)
+//! marker = tracker_from_root · FK'(q_true) · link_from_body' · p_body + N(0, σ_m² Σ)     (3)
 //! body   = tracker_from_root · FK'(q_true) · link_from_body' · exp(N(0, diag(σ_r², σ_t²))) (4)
 //! ```
 //!
+//! Σ is the identity; with cameras in the profile (`plan: {cameras: …}`) it is the covariance of their triangulation, 1 per coordinate on average.
 //! σ_m, σ_r and σ_t may be larger by a stated factor in a recording, or where it repeats its poses (cameras that are occluded there).
 //! `g` is the torque that gravity exerts about the joint (N m), so that c > 0 gives way: from the masses of the URDF (uniform rods where
 //! it has none) and the payloads of the profile.
 //! (1) has no errors of an origin along or about its own axis: a zero offset and the choice of a frame on the axis
 //! describe them already. The same profile and seed give the same bytes.
 //!
-//! [`simulate_streams`] simulates two machines with two clocks. This crate does not simulate cameras and marker swaps.
+//! [`simulate_streams`] simulates two machines with two clocks. This crate does not simulate occlusion by place, nor marker swaps.
 //!
 //! ```
 //! use calib_profile::{check, parse};
@@ -116,11 +117,7 @@ pub fn simulate_postures(
     let mut simulated = simulate(profile, model, seed)?;
     let seed = seed.unwrap_or(plan.seed);
     let robot = TrueRobot::draw(profile, plan, model, seed);
-    let tracker = Tracker {
-        profile,
-        plan,
-        robot: &robot,
-    };
+    let tracker = Tracker::before(profile, plan, &robot, postures.values().flatten());
     for (index, (name, q)) in postures.iter().enumerate() {
         let mut rng = stream(seed, GIVEN + index as u64);
         let protocol = plan.recordings.get(name);
@@ -159,16 +156,17 @@ pub fn simulate_again(
     let plan = profile.simulate.as_ref().ok_or(SimError::NoSection)?;
     let seed = seed.unwrap_or(plan.seed);
     let robot = TrueRobot::draw(profile, plan, model, seed);
-    let tracker = Tracker {
-        profile,
-        plan,
-        robot: &robot,
-    };
-    let mut recordings = BTreeMap::new();
+    let mut all = Vec::new();
     for (index, (name, protocol)) in plan.recordings.iter().enumerate() {
         // A stream of its own per recording: adding one leaves the others as they were.
         let mut rng = stream(seed, repetition * STREAMS + 1 + index as u64);
         let commanded = commanded_poses(protocol, model, &mut rng);
+        all.push((name, protocol, commanded, rng));
+    }
+    let postures = all.iter().flat_map(|(_, _, commanded, _)| &commanded.q);
+    let tracker = Tracker::before(profile, plan, &robot, postures);
+    let mut recordings = BTreeMap::new();
+    for (name, protocol, commanded, mut rng) in all {
         let mut poses = measure(&tracker, model, &commanded, &protocol.bodies, &mut rng);
         if !commanded.groups.is_empty() {
             let group = profile.recordings.get(name).and_then(|r| r.group.clone());

@@ -189,11 +189,18 @@ pub fn simulate_streams(
         log.joint_units.insert(joint.name.clone(), unit_of(joint));
     }
     log.t = Some(times);
-    let tracker = Tracker {
-        profile,
-        plan: section,
-        robot: &robot,
+    let at = |t: f64| {
+        let mut q = model.zero_positions();
+        for (joint, (indicated, error)) in trajectory.at(t) {
+            q[joint.index()] = indicated + error;
+        }
+        q
     };
+    // Often enough for an average.
+    let some: Vec<Vec<f64>> = (0..64)
+        .map(|i| at(f64::from(i) / 64.0 * plan.duration))
+        .collect();
+    let tracker = Tracker::before(profile, section, &robot, some.iter());
     let mut seen = Poses::default();
     let mut times = Vec::new();
     for i in 0..(plan.duration * plan.tracker_hz) as usize {
@@ -201,10 +208,7 @@ pub fn simulate_streams(
         let t = (i as f64 + 0.37) / plan.tracker_hz;
         times.push(t + plan.offset + plan.drift * (t - 0.5 * plan.duration));
         seen.rows.push(i as u64 + 1);
-        let mut q = model.zero_positions();
-        for (joint, (indicated, error)) in trajectory.at(t) {
-            q[joint.index()] = indicated + error;
-        }
+        let q = at(t);
         let sigma = match plan.motion {
             Motion::Continuous => section.noise.joint,
             Motion::StopAndGo { .. } => 0.0,

@@ -47,11 +47,6 @@ pub fn timed(
     };
     let all: Vec<String> = profile.bodies.keys().cloned().collect();
     let bodies = protocol.map_or(&all, |p| &p.bodies);
-    let tracker = Tracker {
-        profile,
-        plan,
-        robot: &robot,
-    };
     let mut rng = stream(seed, STREAMS + index);
     // Indicated positions, and how far the true ones are off while the robot stands there.
     let posture = |row: usize| -> Vec<f64> {
@@ -63,6 +58,7 @@ pub fn timed(
         q
     };
     let indicated: Vec<Vec<f64>> = (0..postures.len()).map(posture).collect();
+    let tracker = Tracker::before(profile, plan, &robot, indicated.iter());
     let mut off = || -> Vec<f64> {
         let joints = 0..model.joints().len();
         let draw = |_| rng.sample::<f64, _>(StandardNormal) * plan.noise.joint;

@@ -1,9 +1,9 @@
 //! What the tracker sees of the bodies in one pose of the robot: eqs. (3) and (4) of the crate's page.
 
 use calib_geometry::{Twist, se3};
-use calib_profile::{BodyKind, Profile, Simulation};
+use calib_profile::{Body, BodyKind, Profile, Simulation};
 use calib_recording::Poses;
-use nalgebra::Isometry3;
+use nalgebra::{Cholesky, Isometry3, Matrix3, Point3};
 use rand::RngExt;
 use rand_chacha::ChaCha12Rng;
 
@@ -14,9 +14,70 @@ pub(crate) struct Tracker<'a> {
     pub(crate) profile: &'a Profile,
     pub(crate) plan: &'a Simulation,
     pub(crate) robot: &'a TrueRobot,
+    /// Factor of the covariances that the cameras cause: 1 per coordinate on average.
+    scale: f64,
 }
 
-impl Tracker<'_> {
+impl<'a> Tracker<'a> {
+    /// Before the robot in these postures (indicated joint positions by joint index), over which the marker noise is on average what the profile
+    /// states: with cameras it differs by place and direction.
+    pub(crate) fn before<'q>(
+        profile: &'a Profile,
+        plan: &'a Simulation,
+        robot: &'a TrueRobot,
+        postures: impl Iterator<Item = &'q Vec<f64>>,
+    ) -> Self {
+        let mut tracker = Self {
+            profile,
+            plan,
+            robot,
+            scale: 1.0,
+        };
+        if profile.plan.cameras.is_empty() {
+            return tracker;
+        }
+        let (mut sum, mut count) = (0.0, 0_u32);
+        for q in postures {
+            let root_from_link = robot.model.forward_kinematics(q);
+            for (name, body) in &profile.bodies {
+                let BodyKind::Markers { names, .. } = &body.kind else {
+                    continue;
+                };
+                let Some(mount) = plan.mounts.get(name) else {
+                    continue;
+                };
+                let tracker_from_body = tracker.tracker_from_body(name, body, &root_from_link);
+                for marker in names {
+                    let at = tracker_from_body * mount.markers[marker];
+                    if let Some(shape) = profile.plan.covariance(&at) {
+                        sum += shape.trace();
+                        count += 1;
+                    }
+                }
+            }
+        }
+        if sum > 0.0 {
+            tracker.scale = 3.0 * f64::from(count) / sum;
+        }
+        tracker
+    }
+
+    /// `tracker_from_root · FK'(q_true) · link_from_body'`.
+    fn tracker_from_body(
+        &self,
+        name: &str,
+        body: &Body,
+        root_from_link: &[Isometry3<f64>],
+    ) -> Isometry3<f64> {
+        self.robot.tracker_from_root * root_from_link[body.link.index()] * self.robot.mounts[name]
+    }
+
+    /// A factor of the covariance of a marker at a place, by the cameras, in units of σ²; `None` without cameras.
+    fn factor(&self, at: &Point3<f64>) -> Option<Matrix3<f64>> {
+        let shape = self.profile.plan.covariance(at)? * self.scale;
+        Some(Cholesky::new(shape)?.l())
+    }
+
     /// Appends one sample of each body to `poses`; `root_from_link` by link, and what the noise of bodies and markers is multiplied by.
     pub(crate) fn observe(
         &self,
@@ -31,10 +92,7 @@ impl Tracker<'_> {
             let Some(body) = self.profile.bodies.get(name) else {
                 continue;
             };
-            // tracker_from_body = tracker_from_root · FK'(q_true) · link_from_body'
-            let tracker_from_body = self.robot.tracker_from_root
-                * root_from_link[body.link.index()]
-                * self.robot.mounts[name];
+            let tracker_from_body = self.tracker_from_body(name, body, root_from_link);
             match &body.kind {
                 BodyKind::Pose => {
                     let error = Twist::new(
@@ -50,7 +108,9 @@ impl Tracker<'_> {
                         let p_body = self.plan.mounts[name].markers[marker];
                         let error = normal3(rng, noise.marker * noise_times);
                         let seen = rng.random::<f64>() >= noise.occluded;
-                        let sample = seen.then(|| tracker_from_body * p_body + error);
+                        let at = tracker_from_body * p_body;
+                        let error = self.factor(&at).map_or(error, |factor| factor * error);
+                        let sample = seen.then(|| at + error);
                         let track = poses.markers.entry(marker.clone()).or_default();
                         track.push(sample);
                     }

@@ -15,6 +15,7 @@ pub(crate) mod goodness;
 pub(crate) mod information;
 mod less_noise;
 mod levels_found;
+mod likelier;
 mod looked_at;
 pub(crate) mod observability;
 mod own_levels;

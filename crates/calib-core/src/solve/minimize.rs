@@ -20,17 +20,24 @@
 //! ```text
 //! v = (g₊ − g) − H₊ δ − K δ,   K ← K + v vᵀ/(vᵀδ)                                              (2)
 //! ```
+//!
+//! The floor of such a valley is curved, and a long step along it leaves it. Where a step raises the cost, a second one from where it
+//! led returns to the floor; both together are taken where they lower the cost:
+//!
+//! ```text
+//! (H₊ + λ S⁻²) c = −g₊,   x ⊞ δ ⊞ c accepted when F falls                                        (3)
+//! ```
 
-use calib_geometry::decompose::{dot, solve_positive};
+use calib_geometry::decompose::dot;
 use serde::{Deserialize, Serialize};
 
-use crate::graph::edge::EdgeKind;
 use crate::model::layout::Model;
-use crate::model::values::{Values, coordinates};
+use crate::model::values::Values;
 use crate::solve::bounded::{Damped, bounded_step};
 use crate::solve::curvature::Curvature;
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::normal::{accumulate, cost};
+use crate::solve::step::{damped_step, retract};
 
 /// How the minimization ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -97,6 +104,8 @@ const CREEPING: f64 = 0.8;
 const LITTLE: f64 = 1e-2;
 /// …while no prediction moves by more than this, squared: 1e-3 σ.
 const UNSEEN_IN_ALL: f64 = 1e-6;
+/// In a curved valley long steps alternate with short ones: a step is compared with the last one of the same damping, so many steps ago at most.
+const PERIOD: usize = 4;
 /// A prior wider than this many typical deviations does not say how far a linearization holds.
 const WIDEST_SCALE: f64 = 30.0;
 /// One wider than this many (300°, 3 m) says nothing: steps are as without it, and values stay where they start along gauges.
@@ -111,9 +120,6 @@ enum Step {
     None,
 }
 
-/// Relative ridge: keeps the factorization positive along directions that nothing sees, and is far too
-/// small to slow down the others.
-const RIDGE: f64 = 1e-10;
 /// Least damping.
 const MIN_DAMPING: f64 = 1e-12;
 /// Damping beyond which a step is shorter than rounding.
@@ -186,8 +192,19 @@ struct Descent<'a> {
     step: Vec<f64>,
     damping: f64,
     decrement: f64,
+    /// The last accepted steps, the newest last.
+    taken: Vec<Taken>,
     iterations: usize,
     evaluable: bool,
+}
+
+/// An accepted step.
+#[derive(Clone, Copy)]
+struct Taken {
+    damping: f64,
+    decrement: f64,
+    /// δᵀ(H − Λ)δ.
+    seen: f64,
 }
 
 impl<'a> Descent<'a> {
@@ -230,6 +247,7 @@ impl<'a> Descent<'a> {
             step: vec![0.0; n],
             damping: settings.damping,
             decrement: f64::INFINITY,
+            taken: Vec::new(),
             iterations: 1,
             evaluable: true,
         }
@@ -250,6 +268,8 @@ impl<'a> Descent<'a> {
                     break SolveStatus::Converged;
                 }
                 Step::Taken => {
+                    let step = self.as_taken();
+                    self.taken.push(step);
                     self.damping = (self.damping * 0.1).max(MIN_DAMPING);
                     self.curvature.slow |= self.decrement < NEAR && self.decrement > SLOW * before;
                     self.curvature.learn(&self.system, &self.next, &self.step);
@@ -285,12 +305,45 @@ impl<'a> Descent<'a> {
             {
                 return outcome;
             }
+            if self.curvature.slow && self.decrement < NEAR && self.returns(work) {
+                return Step::Taken;
+            }
             self.curvature.slow |= self.decrement < NEAR;
             self.damping = (self.damping * 10.0).max(1e-3);
             if self.damping > MAX_DAMPING {
                 return Step::None;
             }
         }
+    }
+
+    /// Equation (3) after a step that raised the cost; `true` where both are taken.
+    fn returns(&mut self, work: &mut Workspace) -> bool {
+        if self.bounded || self.constant_noise {
+            return false;
+        }
+        let objective = self.objective;
+        self.iterations += 1;
+        let mut both = self.step.clone();
+        let mut taken = accumulate(objective, &self.trial, work, &mut self.next) && {
+            let (next, natural) = (&self.next, &self.natural);
+            let mut none = Curvature::new(next.n);
+            let (factor, step) = (&mut self.factor, &mut self.step);
+            damped_step(next, &mut none, natural, self.damping, factor, step)
+        };
+        if taken {
+            let from = self.trial.clone();
+            retract(objective.model, &from, &self.step, &mut self.trial);
+            // With one V for both.
+            let before = cost(objective, &self.values, work);
+            taken = cost(objective, &self.trial, work) <= before;
+        }
+        for (both, back) in both.iter_mut().zip(&self.step) {
+            *both += back;
+        }
+        self.step = both;
+        let at = if taken { &self.trial } else { &self.values };
+        self.evaluable = accumulate(objective, at, work, &mut self.next);
+        taken
     }
 
     /// The step of (1), inside the bounds; `false` when the system cannot be solved.
@@ -332,12 +385,33 @@ impl<'a> Descent<'a> {
         sum
     }
 
-    /// Whether steps that shrink slowly, each by the factor √rate, lead nowhere that matters. The sum of all that follow is
-    /// δ/(1 − √rate); what they gain is half the decrement over the same.
-    fn creeps_for_little(&self, rate: f64) -> bool {
+    /// Whether steps that shrink slowly lead nowhere that matters: the decrement falls by `rate` from each to the next of the same damping, and
+    /// the steps between them by as much. The sum of all that follow is δ/(1 − √rate) with δ over one such period; what they gain is half the
+    /// decrement over the same.
+    fn creeps_for_little(&self) -> bool {
+        let now = self.as_taken();
+        let recent = self.taken.iter().rev().take(PERIOD);
+        let alike = |t: &Taken| (t.damping / now.damping).ln().abs() < 0.1;
+        let Some(period) = recent.clone().position(alike) else {
+            return false;
+        };
+        let before = self.taken[self.taken.len() - 1 - period];
+        let rate = (now.decrement / before.decrement).min(1.0);
+        let between = recent.take(period);
+        let (gain, moved) = between.fold((now.decrement, now.seen.sqrt()), |(gain, moved), t| {
+            (gain + t.decrement, moved + t.seen.max(0.0).sqrt())
+        });
         let shrinks = 1.0 - rate.sqrt();
-        let gain = self.decrement / (2.0 * shrinks);
-        gain <= LITTLE && self.seen_by_data() <= UNSEEN_IN_ALL * shrinks * shrinks
+        rate > CREEPING && gain <= LITTLE * 2.0 * shrinks && moved <= UNSEEN_IN_ALL.sqrt() * shrinks
+    }
+
+    /// The proposed step, as it is remembered once it is accepted.
+    fn as_taken(&self) -> Taken {
+        Taken {
+            damping: self.damping,
+            decrement: self.decrement,
+            seen: self.seen_by_data().max(0.0),
+        }
     }
 
     /// What becomes of the proposed step; `None` when it does not lower the cost. `before`: decrement of the step
@@ -360,7 +434,7 @@ impl<'a> Descent<'a> {
             let little = self.system.prior <= NOTHING && self.decrement <= SLIDE;
             little && rate > SLOW && self.seen_by_data() <= UNSEEN
         };
-        let creeps = || rate > CREEPING && self.creeps_for_little(rate);
+        let creeps = || self.creeps_for_little();
         let soon = self.constant_noise && expected <= enough;
         if self.decrement <= enough || soon || slides() || creeps() {
             let fallen = self.decrement <= enough || cost(objective, &self.trial, work) <= limit;
@@ -375,85 +449,6 @@ impl<'a> Descent<'a> {
             Some(Step::Taken)
         } else {
             None
-        }
-    }
-}
-
-/// Solves (1), with (2) where it is known, by Cholesky of the column-scaled system; `false` when it is not
-/// positive definite.
-fn damped_step(
-    system: &NormalEquations,
-    curvature: &mut Curvature,
-    natural: &[f64],
-    damping: f64,
-    factor: &mut [f64],
-    step: &mut [f64],
-) -> bool {
-    let n = system.n;
-    // Scaled to unit diagonal, scales 1/√H_ii.
-    let scale: Vec<f64> = (0..n)
-        .map(|i| {
-            let d = system.h[i * n + i];
-            if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 }
-        })
-        .collect();
-    let mut with = curvature.known;
-    loop {
-        for i in 0..n {
-            step[i] = -system.g[i] * scale[i];
-            for j in 0..i {
-                factor[i * n + j] = system.h[j * n + i] * scale[i] * scale[j];
-            }
-            factor[i * n + i] = 1.0 + RIDGE + damping * natural[i] * scale[i] * scale[i];
-            if scale[i] == 0.0 {
-                factor[i * n + i] = 1.0;
-            }
-            if with {
-                for j in 0..=i {
-                    factor[i * n + j] += curvature.s[i * n + j] * scale[i] * scale[j];
-                }
-            }
-        }
-        if solve_positive(factor, n, step) {
-            break;
-        }
-        if !with {
-            return false;
-        }
-        // A saddle as far as (2) knows: forget it.
-        with = false;
-        curvature.known = false;
-        curvature.s.fill(0.0);
-    }
-    for i in 0..n {
-        step[i] *= scale[i];
-    }
-    step.iter().all(|x| x.is_finite())
-}
-
-/// x ⊞ δ: coordinates add; a rotation vector that passed π is replaced by the shorter one.
-pub(crate) fn retract(model: &Model, values: &Values, step: &[f64], out: &mut Values) {
-    out.0.copy_from_slice(&values.0);
-    for (c, &p) in model.columns.iter().enumerate() {
-        out.0[p] += step[c];
-    }
-    for edge in &model.problem.edges {
-        let EdgeKind::Unknown(u) = &edge.kind else {
-            continue;
-        };
-        if let [Some(a), Some(b), Some(c), ..] = u.parameters {
-            let ids = [a.index(), b.index(), c.index()];
-            if ids.iter().any(|&p| model.column_of[p].is_none()) {
-                continue;
-            }
-            let omega = coordinates(u, out).fixed_rows::<3>(0).into_owned();
-            let angle = omega.norm();
-            if angle > std::f64::consts::PI {
-                let shorter = omega * (1.0 - 2.0 * std::f64::consts::PI / angle);
-                for (i, &p) in ids.iter().enumerate() {
-                    out.0[p] = shorter[i];
-                }
-            }
         }
     }
 }

@@ -17,6 +17,7 @@ pub(crate) mod relabel;
 pub(crate) mod robust;
 pub(crate) mod rows;
 pub(crate) mod six_rows;
+pub(crate) mod step;
 pub(crate) mod structured;
 pub(crate) mod turned;
 pub(crate) mod whitened;

@@ -121,6 +121,15 @@ super::topic! {
             "Marker `{marker}` of body `{body}` scatters by {sigma} per coordinate, the other markers by {others}: left-out poses are predicted better with a noise level of its own.",
             "Check the marker if it scatters more than the others: it may be loose, damaged, or partly hidden from the cameras.";
     }
+    /// Noise of markers by the cameras of the profile.
+    CAMERA_NOISE = "camera-noise" {
+        "taken": Info,
+            "The noise of a marker follows the cameras of the profile: along its largest direction it is {ratio} times that along its smallest (median), and the fit weighs it so.",
+            "No action is needed. Keep the places of the cameras in the profile true: they are part of the weights.";
+        "doubted": Warning,
+            "The cameras of the profile would make the noise of a marker {ratio} times as large along one direction as along another (median), but left-out poses are likelier with equal noise, which the fit uses.",
+            "Check the places and fields of the cameras (`plan: {{cameras: …}}`): the σ of a plan that was made with them does not hold.";
+    }
     /// The tracker's noise in a recording is another one than in the others.
     RECORDING_NOISE = "recording-noise" {
         "fitted": Info,

@@ -4,7 +4,7 @@ use calib_init::{InitError, Request, propose, tables, write};
 use calib_urdf::RobotModel;
 
 use crate::lab::{
-    Design, Kind, arm, file, files, recordings, request, text, with_cells, with_names,
+    Design, Kind, URDF, arm, file, files, recordings, request, text, with_cells, with_names,
 };
 
 fn refused(given: &[calib_init::File]) -> String {
@@ -202,4 +202,26 @@ fn a_column_that_is_missing_is_named() {
         .collect();
     let said = "Joint `joint_3` moved, and no column has its readings.";
     assert!(facts.iter().any(|fact| fact.contains(said)), "{facts:#?}");
+}
+
+/// A lift under the arm, without a column and with a range that does not contain 0.
+#[test]
+fn a_joint_without_a_column_is_held_within_its_limits() {
+    let lift = "<link name=\"floor\"/><joint name=\"lift\" type=\"prismatic\"><parent link=\"floor\"/><child link=\"ROOT\"/>\
+        <axis xyz=\"0 0 1\"/><limit lower=\"0.21234\" upper=\"0.5\" effort=\"1\" velocity=\"1\"/></joint></robot>";
+    let arm = arm();
+    let root = &arm.link(arm.root()).name;
+    let urdf = URDF.replace("</robot>", &lift.replace("ROOT", root));
+    let model = RobotModel::from_urdf_text(&urdf, "arm.urdf").expect("a robot");
+    let hand = [("hand", "flange", Kind::Markers(3))];
+    let table = text(&recordings(&hand, Design::Random, 1)["poses"]);
+    let proposal = propose(&model, &request(), &[file("poses", table)]);
+    let proposal = proposal.unwrap_or_else(|e| panic!("{e}"));
+    let written = write::profile(&model, &proposal);
+    assert!(written.contains("hold: {lift_mm: 212.4}"), "{written}");
+    let said = "`lift` has no column and cannot stand at 0";
+    assert!(written.contains(said), "{written}");
+    let raw = calib_profile::parse(&written, "arm.yaml").unwrap_or_else(|e| panic!("{e}"));
+    let checked = calib_profile::check(&raw, &written, "arm.yaml", &model);
+    checked.unwrap_or_else(|e| panic!("{e}"));
 }

@@ -15,7 +15,7 @@ use crate::formulate::memory::with_memory;
 use crate::formulate::ml;
 use crate::formulate::realign::realign;
 use crate::formulate::solved::Solved;
-use crate::formulate::{clock, gear_ratio, noise, priors, row_levels, starts, wanted};
+use crate::formulate::{cameras, clock, gear_ratio, noise, priors, row_levels, starts, wanted};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::repeats::merge;
 use crate::prepare::tracks::body_tracks;
@@ -52,7 +52,9 @@ pub fn likelihood(
         // Where gross errors are looked for, what is kept may hang on the start: then it is that of a run of the profile.
         near: chosen.filter(|_| !settings.robust.enabled),
     };
-    let (mut registered, mut fit, mut of_rows) = sided(inputs, checked, &how, progress)?;
+    let found = sided(inputs, checked, &how, progress)?;
+    let (mut registered, mut fit, mut of_rows) =
+        before_cameras(inputs, checked, &how, found, progress)?;
     for _ in 0..ALIGNMENTS {
         if !realign(inputs, &checked.tracks, &fit, ALIGNED) {
             break;
@@ -120,6 +122,29 @@ fn sided(
     }
     checked.findings.extend(starts::findings(inputs));
     Ok(found)
+}
+
+/// What was found with equal noise, or again with that of the profile's cameras where the recordings do not contradict it.
+fn before_cameras(
+    inputs: &mut Inputs,
+    checked: &mut Checked,
+    how: &How<'_>,
+    equal: Fits,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Fits, PipelineError> {
+    let before = (inputs.clone(), checked.tracks.clone());
+    if !cameras::take(inputs) {
+        return Ok(equal);
+    }
+    progress("fit again with the noise of the cameras");
+    let with = fits(inputs, checked, how, progress)?;
+    let doubted = cameras::contradicted(&with.1, &equal.1, how.settings);
+    checked.findings.extend(cameras::finding(inputs, doubted));
+    if doubted {
+        (*inputs, checked.tracks) = before;
+        return Ok(equal);
+    }
+    Ok(with)
 }
 
 /// How to fit.

@@ -3,6 +3,7 @@
 pub mod bad_rows;
 pub mod by_closed_forms;
 pub mod by_likelihood;
+pub mod cameras;
 pub mod checked;
 pub mod chosen;
 pub mod clock;

@@ -79,6 +79,8 @@ pub struct Loaded {
     pub starts: BTreeMap<usize, f64>,
     /// Shape of each marker's covariance per row, in units of the usual variance; empty where no scatter is known.
     pub shapes: BTreeMap<String, Vec<Option<Matrix3<f64>>>>,
+    /// The markers whose shapes follow from the cameras of the profile.
+    pub by_camera: BTreeSet<String>,
     /// Scatter of markers about their bodies, and of bodies that nothing moves; `None` where nothing tells.
     pub scatter: Option<Scatter>,
     /// Usual variances of single rows about the mean of their hold; zero where the rows are no means of holds.

@@ -1,6 +1,6 @@
 //! The table of a recording checked against the robot: names, units, and the joint positions of each row.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_finding::{Fact, Finding, Subject, catalog, nearest_word};
 use calib_profile::{ByRow, Contact, Profile, RecordingSpec};
@@ -72,6 +72,7 @@ pub(crate) fn prepare(
         velocities,
         starts: BTreeMap::new(),
         shapes: BTreeMap::new(),
+        by_camera: BTreeSet::new(),
         row_noise: RowNoise::default(),
         scatter,
         mixed: BTreeMap::new(),

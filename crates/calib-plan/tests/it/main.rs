@@ -1,5 +1,6 @@
 //! Designs, candidates, orders and whole plans.
 
+mod cameras;
 mod cell;
 mod design;
 mod follow;

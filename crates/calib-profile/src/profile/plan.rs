@@ -1,7 +1,13 @@
 //! What may be planned, and what the tracker sees.
+//!
+//! ```text
+//! Σ ∝ (Σ_c (1 − d_c d_cᵀ)/ρ_c²)⁻¹     of a marker, from the directions d and distances ρ of the cameras that see it  (1)
+//! ```
+//!
+//! (1) is a triangulation with equal angular noise.
 
 use calib_urdf::JointId;
-use nalgebra::{Isometry3, Point3, Unit, Vector3};
+use nalgebra::{Isometry3, Matrix3, Point3, Unit, Vector3};
 use std::collections::BTreeMap;
 
 /// What `calib plan` may ask of the robot, and what the tracker sees. Lengths m, angles rad.
@@ -56,4 +62,43 @@ pub struct Facing {
     pub normal: Unit<Vector3<f64>>,
     /// Greatest angle to the line of sight.
     pub within: f64,
+}
+
+impl Camera {
+    /// Whether a point (tracker's frame, m) is in the camera's field and range.
+    #[must_use]
+    pub fn covers(&self, point: &Point3<f64>) -> bool {
+        let sight = point - self.at;
+        sight.norm() <= self.range && self.axis.angle(&sight) <= self.half_field
+    }
+
+    /// One camera's term of equation (1), with 1e-3 along the sight, so that one camera gives a covariance, if a long one.
+    #[must_use]
+    pub fn information(&self, point: &Point3<f64>) -> Matrix3<f64> {
+        /// Information along the line of sight relative to that across it.
+        const ALONG: f64 = 1e-3;
+        let sight = point - self.at;
+        let Some(d) = Unit::try_new(sight, 1e-9) else {
+            return Matrix3::identity();
+        };
+        let dd = d.into_inner() * d.transpose();
+        (Matrix3::identity() - dd * (1.0 - ALONG)) / sight.norm_squared()
+    }
+}
+
+impl PlanSpec {
+    /// Equation (1) of a marker that was seen at a point (tracker's frame, m), up to a factor that all share: by the cameras that cover it, or by
+    /// all where too few do, since it was seen. `None` without cameras.
+    #[must_use]
+    pub fn covariance(&self, point: &Point3<f64>) -> Option<Matrix3<f64>> {
+        let covering = || self.cameras.values().filter(|c| c.covers(point));
+        let enough = covering().count() >= self.min_cameras.max(2);
+        let information = |sum: Matrix3<f64>, c: &Camera| sum + c.information(point);
+        let sum = if enough {
+            covering().fold(Matrix3::zeros(), information)
+        } else {
+            self.cameras.values().fold(Matrix3::zeros(), information)
+        };
+        sum.try_inverse()
+    }
 }

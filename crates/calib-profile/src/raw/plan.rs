@@ -19,7 +19,8 @@ pub struct RawPlan {
     pub ground_mm: Option<f64>,
     /// Boxes that moving links stay out of, by name.
     pub keep_outs: BTreeMap<String, RawKeepOut>,
-    /// The tracker's cameras, by name. Without any, a marker counts as seen in every posture.
+    /// The tracker's cameras, by name. From their places follows what is seen of a posture, and how the noise of a marker is distributed over the
+    /// directions, in plans and in fits. Without any, a marker counts as seen in every posture, and its noise is equal in all directions.
     pub cameras: BTreeMap<String, RawCamera>,
     /// Cameras that a marker or body must be seen by.
     pub min_cameras: usize,
