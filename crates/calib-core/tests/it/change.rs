@@ -22,6 +22,8 @@ enum Event {
     Encoder(usize, f64),
     /// The tracker moves evenly, m from first to last.
     Drift(f64),
+    /// The tracker moves as what warms up, m in the end: with this time constant, in parts of all samples.
+    Warming(f64, f64),
     /// The tracker reads lengths too long by this ratio.
     Scale(f64),
     /// A joint is off its reading by this σ, rad: in every row, or in every stop of the joint.
@@ -118,6 +120,10 @@ fn case_with(seed: u64, design: Design, event: Event, fitted: Fitted) -> Case {
             Event::Bump(m) if later => chain.true_world = shift(m) * after,
             Event::Encoder(j, q) if later => extra[j] += q,
             Event::Drift(m) => chain.true_world = shift(m * s as f64 / samples as f64) * after,
+            Event::Warming(m, part) => {
+                let t = s as f64 / samples as f64;
+                chain.true_world = shift(m * (1.0 - (-t / part).exp())) * after;
+            }
             Event::Scale(ratio) => scale = 1.0 + ratio,
             Event::Scatter(j, sigma, draws) => {
                 let stays = s > 0 && chain.q[s][j] == chain.q[s - 1][j];
@@ -403,6 +409,27 @@ fn drift_and_scale_of_the_tracker_are_named() {
 }
 
 /// The size of a jump, and that its σ is right.
+/// A tracker that warms up is no tracker that was bumped.
+#[test]
+fn a_tracker_that_warms_up_is_no_step() {
+    for design in [Design::Random(60), Design::Sweeps(20)] {
+        for (part, least) in [(0.15, 10), (0.3, 10), (0.6, 10)] {
+            let mut named = 0;
+            for seed in 0..12 {
+                let case = case(4100 + seed, design, Event::Warming(1e-3, part));
+                let scan = scan(&case);
+                let Some(change) = scan.significant() else {
+                    continue;
+                };
+                let drifts = matches!(change.moved, Moved::Drift(_) | Moved::Settling(_));
+                println!("{design:?} {part}: {:?} {:.1}", change.moved, change.excess);
+                named += usize::from(drifts);
+            }
+            assert!(named >= least, "{design:?}, {part}: {named}");
+        }
+    }
+}
+
 #[test]
 fn the_jump_is_as_large_as_it_was() {
     for seed in 0..10 {

@@ -45,6 +45,9 @@ super::topic! {
         "drift": Warning,
             "The tracker's frame drifted by {distance} ± {sigma}[[ and {angle}]] from the first row to the last.[[ Missing physics explains as much: `{physics}`.]]",
             "Let tracker and robot warm up before recording, and record the poses in random order.";
+        "settling": Warning,
+            "The tracker's frame drifted by {distance} ± {sigma}[[ and {angle}]] from the first row to the last, fast at first and slower later, as a tracker or a stand that warms up.[[ Missing physics explains as much: `{physics}`.]]",
+            "Let tracker and robot warm up before recording, and record the poses in random order.";
         "scale": Warning,
             "The tracker reports lengths that differ by {scale:ppm} ± {sigma_scale:ppm} from those of the robot and the stated templates (positive: too long).",
             "Check the tracker's calibration and the unit of the export against a known length.";

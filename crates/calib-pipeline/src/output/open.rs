@@ -104,7 +104,7 @@ fn of_change<'a>(
         Moved::Body(_) => UntestedKind::Slip,
         Moved::Reference(_) => UntestedKind::Bump,
         Moved::Joint(_) => UntestedKind::Step,
-        Moved::Drift(_) => UntestedKind::Drift,
+        Moved::Drift(_) | Moved::Settling(_) => UntestedKind::Drift,
         // What is predicted is seen by the same tracker.
         _ => return None,
     };

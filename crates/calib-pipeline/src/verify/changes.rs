@@ -53,7 +53,12 @@ pub fn finding(inputs: &Inputs, fit: &MlFit, scan: &ChangeScan, beside: Beside) 
     let names = Names { inputs, fit };
     let finding = names.described(change)?;
     // The tracker that moved and the tracker that drifted have one name.
-    let is_tracker = |moved| matches!(moved, Moved::Reference(_) | Moved::Drift(_));
+    let is_tracker = |moved| {
+        matches!(
+            moved,
+            Moved::Reference(_) | Moved::Drift(_) | Moved::Settling(_)
+        )
+    };
     let rivals = scan.rivals().into_iter();
     let others = rivals.filter(|c| !(is_tracker(c.moved) && is_tracker(change.moved)));
     let mut rivals: Vec<String> = others.filter_map(|c| names.of(c.moved)).collect();
@@ -180,7 +185,7 @@ impl Names<'_> {
         match moved {
             Moved::Body(frame) => self.body(frame).cloned(),
             Moved::Joint(edge) => self.joint(edge).map(|joint| joint.name.clone()),
-            Moved::Reference(_) | Moved::Drift(_) => {
+            Moved::Reference(_) | Moved::Drift(_) | Moved::Settling(_) => {
                 Some(self.inputs.robot.profile.tracker.frame.clone())
             }
             _ => None,
@@ -197,6 +202,7 @@ impl Names<'_> {
             }
             Moved::Reference(_) => Finding::of_kind(id, "tracker", About::Tracker),
             Moved::Drift(_) => Finding::of_kind(id, "drift", About::Tracker),
+            Moved::Settling(_) => Finding::of_kind(id, "settling", About::Tracker),
             Moved::Scale(_) => Finding::of_kind(id, "scale", About::Tracker)
                 .with("scale", Fact::ratio(change.jump[0]))
                 .with("sigma_scale", Fact::ratio(change.sigma[0])),
@@ -235,7 +241,7 @@ impl Names<'_> {
             _ => finding,
         };
         Some(match change.moved {
-            Moved::Drift(_) | Moved::Scale(_) => finding,
+            Moved::Drift(_) | Moved::Settling(_) | Moved::Scale(_) => finding,
             _ => self.placed(finding, change),
         })
     }

@@ -178,9 +178,10 @@ fn drawn(
     let mut g = DMatrix::zeros(n, sets);
     let mut costs = vec![0.0; sets];
     let width = design.kept.first().map_or(0, |k| k.b.nrows());
-    // Σ B̃ᵀz up to each sample, and the same in proportion to the place: all columns.
+    // Σ B̃ᵀz up to each sample, and the same with the factors of each drift: all columns.
     let mut steps = vec![DMatrix::<f64>::zeros(width, sets)];
-    let mut linear = DMatrix::<f64>::zeros(width, sets);
+    let mut drifts = [Pattern::Linear, Pattern::Settling]
+        .map(|pattern| (pattern, DMatrix::<f64>::zeros(width, sets)));
     let count = design.kept.len();
     let squares = |costs: &mut [f64], of: &DMatrix<f64>| {
         let columns = costs.iter_mut().zip(of.column_iter());
@@ -189,8 +190,10 @@ fn drawn(
     for (place, (kept, z)) in design.kept.iter().zip(z).enumerate() {
         kept.a.add_transposed_times(1.0, z, &mut g);
         let own = &kept.b * z;
-        let factor = place as f64 / (count - 1) as f64 - 0.5;
-        linear.zip_apply(&own, |sum, x| *sum += factor * x);
+        for (pattern, sums) in &mut drifts {
+            let factor = pattern.factor(place, count);
+            sums.zip_apply(&own, |sum, x| *sum += factor * x);
+        }
         steps.push(&steps[place] + own);
         squares(&mut costs, z);
     }
@@ -210,7 +213,8 @@ fn drawn(
                 let u = match (design.patterns[k], edge) {
                     (Pattern::Step, _) => own(&steps[edge], i),
                     (_, 0) => 0.0,
-                    (Pattern::Linear, _) => own(&linear, i),
+                    (Pattern::Linear, _) => own(&drifts[0].1, i),
+                    (Pattern::Settling, _) => own(&drifts[1].1, i),
                     (Pattern::Constant, _) => own(&steps[count], i),
                 };
                 u - shifted[edge * columns.len() + i]

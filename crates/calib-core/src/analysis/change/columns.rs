@@ -20,8 +20,25 @@ pub(crate) enum Pattern {
     Step,
     /// In proportion to the place of the sample, from −½ to ½.
     Linear,
+    /// As what warms up: from −½ to ½, with a quarter of the samples as time constant.
+    Settling,
     /// Everywhere.
     Constant,
+}
+
+/// Time constant of [`Pattern::Settling`], in parts of all samples: half to twice as long are distinguished from a step and from an even drift.
+const SETTLING: f64 = 0.25;
+
+impl Pattern {
+    /// What columns are multiplied by at a place among so many samples.
+    pub(crate) fn factor(self, place: usize, samples: usize) -> f64 {
+        let part = place as f64 / samples.saturating_sub(1).max(1) as f64;
+        match self {
+            Self::Linear => part - 0.5,
+            Self::Settling => (-part / SETTLING).exp_m1() / (-1.0 / SETTLING).exp_m1() - 0.5,
+            Self::Step | Self::Constant => 1.0,
+        }
+    }
 }
 
 pub(crate) struct Candidate {
@@ -72,11 +89,16 @@ impl Candidates {
             if out.references.iter().all(|(f, _)| *f != from) {
                 let first = out.add(Moved::Reference(from), Pattern::Step, 6);
                 let columns = first..first + 6;
-                out.list.push(Candidate {
-                    moved: Moved::Drift(from),
-                    pattern: Pattern::Linear,
-                    columns,
-                });
+                for (moved, pattern) in [
+                    (Moved::Drift(from), Pattern::Linear),
+                    (Moved::Settling(from), Pattern::Settling),
+                ] {
+                    out.list.push(Candidate {
+                        moved,
+                        pattern,
+                        columns: columns.clone(),
+                    });
+                }
                 out.references.push((from, first));
                 let first = out.add(Moved::Scale(from), Pattern::Constant, 1);
                 out.scales.push((from, first));

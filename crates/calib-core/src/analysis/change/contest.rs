@@ -328,10 +328,9 @@ pub(crate) fn holds(
     let mut out = vec![0.0; samples];
     match pattern {
         Pattern::Constant => out.fill(1.0),
-        Pattern::Linear => {
-            let last = used.len().saturating_sub(1).max(1) as f64;
+        Pattern::Linear | Pattern::Settling => {
             for (place, sample) in used.iter().enumerate() {
-                out[*sample] = place as f64 / last - 0.5;
+                out[*sample] = pattern.factor(place, used.len());
             }
         }
         Pattern::Step => {

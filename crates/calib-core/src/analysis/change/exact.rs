@@ -120,7 +120,7 @@ impl Solution {
                     let back = step.inverse();
                     self.correct_seen(&mut corrected, scanned.candidates, (what, &back), &inside);
                 }
-                Moved::Drift(_) | Moved::Scale(_) => return None,
+                Moved::Drift(_) | Moved::Settling(_) | Moved::Scale(_) => return None,
             }
             let here = Design::new(
                 &corrected,

@@ -1,4 +1,4 @@
-//! Did something move while the data were taken? Score tests of a step, a drift and a scale against the fitted model.
+//! Did something move while the data were taken? Score tests of a step, an even drift, a warm-up and a scale against the fitted model.
 //!
 //! Candidates: everything seen at one frame (a body that slipped), the measuring frame (a tracker that was bumped), one
 //! joint (an encoder that slipped). B holds the columns ∂e/∂c of a candidate for the samples of a range S and 0 elsewhere:
@@ -60,6 +60,8 @@ pub enum Moved {
     Joint(EdgeId),
     /// The measuring frame, evenly over the samples; `[ω; v]` from first to last.
     Drift(FrameId),
+    /// The measuring frame, fast at first and slower later, as what warms up; `[ω; v]` from first to last.
+    Settling(FrameId),
     /// The lengths that the measuring frame reports, throughout; a ratio.
     Scale(FrameId),
 }

@@ -74,7 +74,7 @@ impl<'a> Changed<'a> {
         let fitted = solution.used_samples();
         let holds = holds(change, pattern, &problem.borders, &fitted, problem.samples);
         let used = match pattern {
-            Pattern::Linear => END,
+            Pattern::Linear | Pattern::Settling => END,
             Pattern::Constant => 1.0,
             // A change that holds from the first sample on was undone later.
             Pattern::Step => {
@@ -184,7 +184,7 @@ impl<'a> Changed<'a> {
         let residuals = &sums.along + sums.b.tr_mul(step);
         let more = 2.0 * jump.dot(&residuals) + jump.dot(&(&sums.own * jump));
         match self.pattern {
-            Pattern::Linear => END,
+            Pattern::Linear | Pattern::Settling => END,
             Pattern::Constant => 1.0,
             Pattern::Step => f64::from(u8::from(more < 0.0)),
         }
@@ -201,7 +201,7 @@ impl<'a> Changed<'a> {
                 posture.turn * axis.cross(&lever)
             }
             Moved::Body(_) => posture.turn * axis,
-            Moved::Reference(frame) | Moved::Drift(frame) => {
+            Moved::Reference(frame) | Moved::Drift(frame) | Moved::Settling(frame) => {
                 let lever = posture.point.position.coords - self.candidates.middle(frame);
                 if turns { axis.cross(&lever) } else { axis }
             }

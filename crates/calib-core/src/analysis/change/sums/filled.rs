@@ -182,17 +182,14 @@ impl Design {
         self.kept.extend(seen.kept);
     }
 
-    /// What a candidate's columns are multiplied by at a sample: its place from −½ to ½ for a drift.
+    /// What a candidate's columns are multiplied by at a sample.
     pub(in crate::analysis::change) fn factor(
         &self,
         candidate: usize,
         place: usize,
         samples: usize,
     ) -> f64 {
-        match self.patterns[candidate] {
-            Pattern::Linear => place as f64 / (samples - 1) as f64 - 0.5,
-            _ => 1.0,
-        }
+        self.patterns[candidate].factor(place, samples)
     }
 
     /// C of the samples, F at their own minimum, and U there: one Gauss–Newton step from the fit, which is zero where
