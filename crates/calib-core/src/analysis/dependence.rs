@@ -14,6 +14,9 @@
 //! factor κ for the level of the noise, which the fit makes look smaller. Residuals of missing physics that follow the order of the samples
 //! look the same, and are treated the same.
 //!
+//! What a frame measures from may move as one, t in its axes: B t in all rows x of a sample. (1) to (3) then hold for Bᵀy, Bᵀk and BᵀWB in
+//! place of y, k and W, and c ρ^l is the covariance of t, in units of a level of the noise.
+//!
 //! The rows of a measured pose are turned into the axes of the frame that it was measured from: a tracker's memory stands still
 //! there, and turns with the body in the body's own axes.
 //!
@@ -42,6 +45,9 @@ pub enum MemoryOf {
     Positions,
     /// Their orientations; the positions have none.
     Orientations,
+    /// Everything that a frame measures from, which moves as one: a stand or the air, not a marker. It is found where the scatter of the joints has
+    /// taken it up, too.
+    Together,
 }
 
 /// Memory of the noise.
@@ -50,7 +56,7 @@ pub enum MemoryOf {
 pub struct Dependence {
     /// Which rows have it.
     pub of: MemoryOf,
-    /// Correlation of successive samples that the residuals of the fit show.
+    /// Correlation of successive samples that the residuals of the fit show; of [`MemoryOf::Together`] in units of the first noise level, as the share.
     pub lag_one: f64,
     /// That correlation over its standard deviation for noise without memory.
     pub z: f64,
@@ -103,7 +109,13 @@ impl Solution {
     /// remembered. Where the residuals do not show one, decay and share are zero, and correlation and z may be bounds that are too large. `None` where fewer than eight samples or no pairs of rows exist.
     #[must_use]
     pub fn dependence(&self, borders: &[usize]) -> Option<Dependence> {
-        self.dependence_beside(borders, &|_, _, _| {})
+        const CLEARER: f64 = 1.1;
+        let nothing: &BesideRows = &|_, _, _| {};
+        let apart = self.dependence_beside(borders, nothing)?;
+        let together = self.dependence_of(MemoryOf::Together, borders, nothing);
+        // Rows that each have a memory have one together, too; it is less clear, or as clear where there is one marker or one pose.
+        let clearer = together.filter(|t| t.is_significant() && t.z > CLEARER * apart.z);
+        Some(clearer.unwrap_or(apart))
     }
 
     /// The same where the residuals of a sample are first changed: what they are beside something that the model does not have.
@@ -162,6 +174,12 @@ impl Solution {
         if !found.is_significant() {
             return Some(found);
         }
+        // A part of a row's noise; what moves as one may be any number of times as large.
+        let most = if of == MemoryOf::Together {
+            f64::INFINITY
+        } else {
+            1.0
+        };
         for round in 0..ROUNDS {
             let bias = bias(&samples, &c, found.share, found.decay);
             // κ from lag 0, then γ_l = (seen / κ − bias) / T
@@ -191,7 +209,7 @@ impl Solution {
                 gamma[0].clamp(0.0, LARGEST_DECAY)
             };
             found.share = if found.decay > 0.0 {
-                (gamma[0] / found.decay).clamp(0.0, 1.0)
+                (gamma[0] / found.decay).clamp(0.0, most)
             } else {
                 0.0
             };

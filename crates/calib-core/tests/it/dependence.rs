@@ -27,6 +27,8 @@ struct Case {
 enum Seen {
     Markers,
     Poses,
+    /// Markers whose noise has no memory; all of them move together by so many times it, slowly.
+    Wander(f64),
 }
 
 /// `poses` random poses; the noise of positions is an autoregression of first order by rows, along the axes of the tracker.
@@ -43,6 +45,10 @@ fn case_of(free: Free, seen: Seen, (seed, factor): (u64, f64), poses: usize, rho
     let mut h = chain.problem(&free, SIGMA);
     h.problem.group_mut(h.markers).estimate = true;
     h.scattering_joints(JOINT);
+    let mut stand = match seen {
+        Seen::Wander(_) => normal3(&mut r),
+        _ => Vector3::zeros(),
+    };
     let mut state: Vec<Vector3<f64>> = chain.markers.iter().map(|_| normal3(&mut r)).collect();
     let (mut markers, mut bodies) = (Vec::new(), Vec::new());
     for (sample, q) in chain.q.iter().enumerate() {
@@ -50,6 +56,12 @@ fn case_of(free: Free, seen: Seen, (seed, factor): (u64, f64), poses: usize, rho
         let x = chain.tracker_from_body(q, &extra);
         for state in &mut state {
             *state = *state * rho + normal3(&mut r) * (1.0 - rho * rho).sqrt();
+        }
+        if let Seen::Wander(size) = seen {
+            stand = stand * rho + normal3(&mut r) * (1.0 - rho * rho).sqrt();
+            for state in &mut state {
+                *state = normal3(&mut r) + stand * size;
+            }
         }
         for (m, p) in chain.markers.iter().enumerate() {
             markers.push(calib_core::MarkerObservation {
@@ -66,7 +78,7 @@ fn case_of(free: Free, seen: Seen, (seed, factor): (u64, f64), poses: usize, rho
     }
     let p = &mut h.problem;
     match seen {
-        Seen::Markers => p.markers("body", h.tracker, h.body, h.markers, markers),
+        Seen::Markers | Seen::Wander(_) => p.markers("body", h.tracker, h.body, h.markers, markers),
         Seen::Poses => {
             let orientation = p.noise_group("turn", NoiseKind::Orientation, TURN, true);
             let noise = PoseNoise::Split {
@@ -153,6 +165,25 @@ fn positions_of_poses_with_a_memory_are_covered() {
         assert!((decay - 0.9).abs() < 0.05, "{decay}");
         assert!(naive[0] < 0.85, "the fault is there: {naive:?}");
         assert!((0.93..0.985).contains(&under[0]), "{poses}: {under:?}");
+    }
+}
+
+/// A stand or air that moves all markers alike. With a memory of 33 samples the parameters take up most of what would show it.
+#[test]
+fn what_moves_together_is_covered() {
+    for (size, rho, poses, often, least) in [
+        (1.0, 0.9, 60, 13, 0.93),
+        (2.0, 0.9, 150, 16, 0.93),
+        (0.5, 0.97, 150, 10, 0.72),
+        (1.0, 0.97, 150, 16, 0.8),
+    ] {
+        let seen = Seen::Wander(size);
+        let (naive, under, significant, decay) = mean_coverage(seen, 16, poses, rho);
+        let case = format!("{size}, {rho}, {poses}: {naive:?}, {under:?}, {decay}");
+        println!("{case}");
+        assert!(significant >= often, "{case}: {significant}");
+        assert!(naive[0] < 0.8, "the fault is there: {case}");
+        assert!(under[0] >= least, "{case}");
     }
 }
 

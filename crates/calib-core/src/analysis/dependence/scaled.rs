@@ -85,11 +85,51 @@ pub(super) fn scaled_sample(solution: &Solution, rows: &Whitened, of: MemoryOf) 
     }
     // The product of a transpose has no fast kernel.
     let transposed = scaled.transpose();
-    Unnumbered {
+    let apart = Unnumbered {
         k: rows.a.transposed_times(&scaled).transpose(),
         y: &transposed * &rows.w,
         w: &transposed * &scaled,
         rows: own,
+    };
+    match of {
+        MemoryOf::Together => apart.together(solution, &sigma),
+        _ => apart,
+    }
+}
+
+impl Unnumbered {
+    /// Three rows for each frame that the sample is measured from: what its motion along an axis does to all rows.
+    fn together(self, solution: &Solution, sigma: &[f64]) -> Self {
+        let unit = solution.theta.first().map_or(1.0, |theta| theta.sqrt());
+        let problem = solution.model.problem();
+        let mut all: Vec<Row> = Vec::new();
+        let mut places = vec![None; sigma.len()];
+        for (i, row) in self.rows.iter().enumerate() {
+            let Some((measurement, _, axis)) = *row else {
+                continue;
+            };
+            let from = problem.measurements[measurement].from.index();
+            let key = (from, 0, axis % 3);
+            let place = all.iter().position(|k| *k == key);
+            let place = place.unwrap_or_else(|| {
+                all.push(key);
+                all.len() - 1
+            });
+            places[i] = Some(place);
+        }
+        let mut b = DMatrix::zeros(sigma.len(), all.len());
+        for (i, place) in places.iter().enumerate() {
+            if let Some(place) = place {
+                b[(i, *place)] = unit / sigma[i];
+            }
+        }
+        let across = b.transpose();
+        Self {
+            k: &across * &self.k,
+            w: &across * &self.w * &b,
+            y: &across * &self.y,
+            rows: all.into_iter().map(Some).collect(),
+        }
     }
 }
 
@@ -112,6 +152,10 @@ fn asked(of: MemoryOf, kind: &MeasurementKind, row: usize) -> bool {
         MemoryOf::All => true,
         MemoryOf::Positions => pose && row >= 3,
         MemoryOf::Orientations => pose && row < 3,
+        MemoryOf::Together => match kind {
+            MeasurementKind::Markers(_) => true,
+            _ => pose && row >= 3,
+        },
     }
 }
 
