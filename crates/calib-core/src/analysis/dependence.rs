@@ -31,63 +31,11 @@ use crate::graph::measurement::MeasurementKind;
 use crate::solve::equations::Workspace;
 use crate::solve::whitened::{Whitened, covariance_of, whitened};
 
+mod found;
 mod scaled;
 
+pub use found::{Dependence, MemoryOf};
 use scaled::{Keys, Scaled, Unnumbered, scaled_sample};
-
-/// Which rows have the memory.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-#[non_exhaustive]
-pub enum MemoryOf {
-    /// All.
-    All,
-    /// Positions of bodies that are measured as poses; their orientations have none.
-    Positions,
-    /// Their orientations; the positions have none.
-    Orientations,
-    /// Everything that a frame measures from, which moves as one: a stand or the air, not a marker. It is found where the scatter of the joints has
-    /// taken it up, too.
-    Together,
-}
-
-/// Memory of the noise.
-#[derive(Debug, Clone, Copy, PartialEq)]
-#[non_exhaustive]
-pub struct Dependence {
-    /// Which rows have it.
-    pub of: MemoryOf,
-    /// Correlation of successive samples that the residuals of the fit show; of [`MemoryOf::Together`] in units of the first noise level, as the share.
-    pub lag_one: f64,
-    /// That correlation over its standard deviation for noise without memory.
-    pub z: f64,
-    /// ρ: how much of the memory is left after one sample more.
-    pub decay: f64,
-    /// c: part of the noise that has a memory.
-    pub share: f64,
-    /// κ: variance of the noise over what the fit found.
-    pub level: f64,
-}
-
-impl Dependence {
-    /// Variance of a sum over many samples, over what it is without memory.
-    #[must_use]
-    pub fn of_sums(&self) -> f64 {
-        self.level * (1.0 + 2.0 * self.share * self.decay / (1.0 - self.decay))
-    }
-
-    /// Whether noise without memory shows so much less often than once in a thousand fits.
-    #[must_use]
-    pub fn is_significant(&self) -> bool {
-        /// One-sided normal quantile of 0.999…
-        const Z: f64 = 3.09;
-        /// …and of 0.9995, for each of two parts.
-        const Z_OF_PART: f64 = 3.29;
-        match self.of {
-            MemoryOf::All => self.z > Z,
-            _ => self.z > Z_OF_PART,
-        }
-    }
-}
 
 /// Changes the whitened residuals of a sample.
 pub(crate) type BesideRows<'a> = dyn Fn(usize, &mut Whitened, &Workspace) + Sync + 'a;
@@ -109,13 +57,7 @@ impl Solution {
     /// remembered. Where the residuals do not show one, decay and share are zero, and correlation and z may be bounds that are too large. `None` where fewer than eight samples or no pairs of rows exist.
     #[must_use]
     pub fn dependence(&self, borders: &[usize]) -> Option<Dependence> {
-        const CLEARER: f64 = 1.1;
-        let nothing: &BesideRows = &|_, _, _| {};
-        let apart = self.dependence_beside(borders, nothing)?;
-        let together = self.dependence_of(MemoryOf::Together, borders, nothing);
-        // Rows that each have a memory have one together, too; it is less clear, or as clear where there is one marker or one pose.
-        let clearer = together.filter(|t| t.is_significant() && t.z > CLEARER * apart.z);
-        Some(clearer.unwrap_or(apart))
+        self.dependence_beside(borders, &|_, _, _| {})
     }
 
     /// The same where the residuals of a sample are first changed: what they are beside something that the model does not have.
@@ -124,6 +66,15 @@ impl Solution {
         borders: &[usize],
         beside: &BesideRows,
     ) -> Option<Dependence> {
+        const CLEARER: f64 = 1.1;
+        let apart = self.dependence_apart(borders, beside)?;
+        let together = self.dependence_of(MemoryOf::Together, borders, beside);
+        // Rows that each have a memory have one together, too; it is less clear, or as clear where there is one marker or one pose.
+        let clearer = together.filter(|t| t.is_significant() && t.z > CLEARER * apart.z);
+        Some(clearer.unwrap_or(apart))
+    }
+
+    fn dependence_apart(&self, borders: &[usize], beside: &BesideRows) -> Option<Dependence> {
         let all = self.dependence_of(MemoryOf::All, borders, beside)?;
         let mut measurements = self.model.problem.measurements.iter();
         let poses = measurements.any(|m| matches!(m.kind, MeasurementKind::Poses(_)));
@@ -166,8 +117,14 @@ impl Solution {
             z: 0.0,
             decay: 0.0,
             share: 0.0,
+            correlated: 1.0,
             level: 1.0,
         };
+        let pairs = samples.iter().skip(1).filter(|s| !s.starts).count();
+        if of == MemoryOf::Together {
+            let each = |sum: f64, count: usize| sum / count.max(1) as f64;
+            found.correlated = each(expected[1], pairs) / each(expected[0], samples.len());
+        }
         let most = most_bias(&samples, c.nrows());
         found.lag_one = (seen[1].max(0.0) + most) / expected[1];
         found.z = found.lag_one * expected[1].sqrt();
@@ -197,6 +154,7 @@ impl Solution {
                 found.lag_one = gamma[0];
                 // Var(ŷ_s·ŷ_t) = tr(W_s W_t) without memory
                 found.z = gamma[0] * expected[1].sqrt();
+                found.lag_one *= found.correlated;
                 if !found.is_significant() {
                     return Some(found);
                 }

@@ -22,6 +22,8 @@ struct Rows {
     shared: usize,
     /// The tracker moves by so much in the middle, m.
     bump: f64,
+    /// Everything that is seen wanders by this σ, m, with a memory of 0.9.
+    wander: f64,
 }
 
 const STATIC: Rows = Rows {
@@ -30,6 +32,7 @@ const STATIC: Rows = Rows {
     rho: 0.0,
     shared: 1,
     bump: 0.0,
+    wander: 0.0,
 };
 
 fn fit(seed: u64, rows: Rows) -> Solution {
@@ -52,6 +55,10 @@ fn fit(seed: u64, rows: Rows) -> Solution {
     h.scattering_joints(JOINT);
     let mut state: Vec<Vector3<f64>> = chain.markers.iter().map(|_| normal3(&mut r)).collect();
     let bump = normal3(&mut r).normalize() * rows.bump;
+    let mut wander = match rows.wander {
+        0.0 => Vector3::zeros(),
+        sigma => normal3(&mut r) * sigma,
+    };
     let mut off = Vec::new();
     let mut markers = Vec::new();
     for (sample, q) in chain.q.iter().enumerate() {
@@ -59,6 +66,10 @@ fn fit(seed: u64, rows: Rows) -> Solution {
             off = q.iter().map(|_| normal(&mut r) * JOINT).collect();
         }
         let x = chain.tracker_from_body(q, &off);
+        if rows.wander > 0.0 {
+            let new = normal3(&mut r) * rows.wander;
+            wander = wander * 0.9 + new * 0.19_f64.sqrt();
+        }
         for (m, p) in chain.markers.iter().enumerate() {
             let new = normal3(&mut r) * (1.0 - rows.rho * rows.rho).sqrt();
             state[m] = state[m] * rows.rho + new;
@@ -66,7 +77,7 @@ fn fit(seed: u64, rows: Rows) -> Solution {
             markers.push(MarkerObservation {
                 sample,
                 point: h.points[m],
-                position: x * p + state[m] * SIGMA + bump * moved,
+                position: x * p + state[m] * SIGMA + bump * moved + wander,
                 shape: None,
             });
         }
@@ -128,6 +139,25 @@ fn memory_is_neither_a_change_nor_an_effect() {
     assert_eq!(named(robots(10), Rows { rho: 0.5, ..long }), (0, 0));
 }
 
+/// A stand that moves slowly is no step. The noise of single markers has no memory.
+#[test]
+fn what_wanders_is_no_change() {
+    for (count, wander) in [(60, SIGMA), (200, SIGMA), (200, 2.0 * SIGMA)] {
+        let rows = Rows {
+            count,
+            wander,
+            ..STATIC
+        };
+        let all = robots(20);
+        let (changed, missing) = named(all, rows);
+        // With 60 rows 2 of 20, with 200 none.
+        assert!(
+            8 * changed as u64 <= all && missing == 0,
+            "{count} rows, {wander}: {changed}, {missing}"
+        );
+    }
+}
+
 /// Joints that err by the same in twenty rows: the noise of the markers has no memory.
 #[test]
 fn joint_errors_that_rows_share_are_no_change() {
@@ -150,6 +180,7 @@ fn a_bump_is_named_beside_memory() {
         rho: 0.9,
         shared: 1,
         bump: 0.5e-3,
+        wander: 0.0,
     };
     let held = Rows {
         shared: 20,

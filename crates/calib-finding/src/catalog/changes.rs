@@ -13,7 +13,7 @@ super::topic! {
             "The residuals of successive rows are correlated ({correlation}). The stated uncertainties allow for it and are up to {factor} times larger than for independent noise.",
             "Record the poses in random order and wait between them; switch off filters of the tracker. If an effect is named as missing, enable it first.";
         "together": Warning,
-            "Everything that the tracker sees moves together from row to row, and slowly: {correlation} of it is left in the next row. The stated uncertainties allow for it and are up to {factor} times larger than for independent noise.",
+            "Everything that the tracker sees moves together from row to row, by amounts that are correlated in successive rows ({correlation}). The stated uncertainties allow for it and are up to {factor} times larger than for independent noise.",
             "Let tracker and stand warm up, keep drafts and vibrations away, and record the poses in random order. If an effect is named as missing, enable it first.";
     }
     /// Too few rows for the tests of the fit.

@@ -28,13 +28,13 @@ pub(crate) fn with_memory(fit: &mut MlFit) -> Option<Finding> {
         .map(|(b, a)| a / b);
     let factor = ratios.fold(1.0, f64::max);
     fit.solution = under;
-    let (form, correlation) = match found.of {
-        MemoryOf::Together => ("together", found.decay),
-        // An estimate, which may exceed what a correlation can be.
-        _ => ("apart", found.lag_one),
+    let form = match found.of {
+        MemoryOf::Together => "together",
+        _ => "apart",
     };
     let finding = Finding::of_kind(catalog::NOISE_HAS_MEMORY, form, About::Fit)
-        .with("correlation", Fact::ratio(correlation.min(LARGEST)))
+        // An estimate, which may exceed what a correlation can be.
+        .with("correlation", Fact::ratio(found.lag_one.min(LARGEST)))
         .with("factor", Fact::number(factor, calib_finding::Unit::One));
     Some(finding)
 }
