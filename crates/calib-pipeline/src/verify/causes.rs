@@ -97,6 +97,8 @@ pub fn causes(inputs: &Inputs, fit: &MlFit, before: &[Finding]) -> Causes {
     if let Some(change) = &causes.changed {
         let rows = changes::rows_of(inputs, fit, change, before);
         causes.explained.extend(rows);
+        let memory = changes::memory_of(change, before);
+        causes.explained.extend(memory.cloned());
     }
     causes
 }

@@ -138,6 +138,20 @@ pub fn rows_of(
     found.into_iter().cloned().collect()
 }
 
+/// The finding on a memory of everything that is seen, where a tracker that moved is all that it is.
+pub fn memory_of<'f>(
+    change: &Change,
+    findings: &'f [Finding],
+) -> impl Iterator<Item = &'f Finding> {
+    let tracker = matches!(
+        change.moved,
+        Moved::Reference(_) | Moved::Drift(_) | Moved::Settling(_)
+    );
+    let kind = |f: &Finding| f.facts.get("kind").and_then(Fact::word) == Some("together");
+    let all = findings.iter();
+    all.filter(move |f| tracker && f.id == catalog::NOISE_HAS_MEMORY && kind(f))
+}
+
 /// The joint that scatters.
 #[must_use]
 pub fn scatter(inputs: &Inputs, fit: &MlFit, scatter: Scatter) -> Option<Finding> {
