@@ -25,7 +25,9 @@ const ROUND: f64 = 1.2;
 /// what they scattered keep it.
 pub fn take(inputs: &mut Inputs) -> bool {
     let plan = &inputs.robot.profile.plan;
-    if plan.cameras.is_empty() {
+    // Recordings of a twin have them already.
+    let given = inputs.recordings.values().any(|l| !l.by_camera.is_empty());
+    if plan.cameras.is_empty() || given {
         return false;
     }
     let bodies = inputs.robot.profile.bodies.iter();
@@ -35,7 +37,7 @@ pub fn take(inputs: &mut Inputs) -> bool {
         BodyKind::Pose => None,
     });
     let names: Vec<&String> = names.flatten().collect();
-    let (mut sum, mut count) = (0.0, 0_u32);
+    let (mut sum, mut count) = (0.0, 0);
     for loaded in inputs.recordings.values_mut() {
         for &name in &names {
             let Some(track) = loaded.poses.markers.get(name) else {
@@ -46,19 +48,20 @@ pub fn take(inputs: &mut Inputs) -> bool {
             }
             let of = |seen: &Option<_>| seen.as_ref().and_then(|at| plan.covariance(at));
             let shapes: Vec<Option<Matrix3<f64>>> = track.iter().map(of).collect();
-            for shape in shapes.iter().flatten() {
-                sum += shape.trace();
-                count += 1;
+            if shapes.iter().all(Option::is_none) {
+                continue;
             }
+            let seen = shapes.iter().flatten();
+            sum += seen.clone().map(Matrix3::trace).sum::<f64>();
+            count += seen.count();
             loaded.shapes.insert(name.clone(), shapes);
             loaded.by_camera.insert(name.clone());
         }
     }
     if count == 0 || sum <= 0.0 {
-        take_back(inputs);
         return false;
     }
-    let scale = 3.0 * f64::from(count) / sum;
+    let scale = 3.0 * count as f64 / sum;
     for loaded in inputs.recordings.values_mut() {
         by_camera(loaded).for_each(|shape| *shape *= scale);
     }
