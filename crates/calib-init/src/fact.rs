@@ -472,10 +472,7 @@ fn is_guess(about: &About) -> bool {
         About::LinkStated { better, .. } => better.is_some(),
         About::Link {
             rms, next, same, ..
-        } => {
-            let near = next.as_ref().is_some_and(|n| n.rms < CERTAIN * rms);
-            near || !same.is_empty()
-        }
+        } if !same.is_empty() || next.as_ref().is_some_and(|n| n.rms < CERTAIN * rms) => true,
         About::Time { named, .. } => !named,
         About::Log { named, rows, .. } => !named || rows.is_some(),
         About::TipOfChain { .. }

@@ -445,11 +445,10 @@ fn missing(model: &RobotModel, proposal: &mut Proposal, tables: &[Poses]) -> Vec
             facts.push(Fact::new(place(), About::JointsMissing { joints }));
         }
         for &joint in &elsewhere {
-            let about = About::JointAtItsLimit {
-                joint: model.joint(joint).name.clone(),
-                at: resting[joint.index()],
-                turns: model.joint(joint).kind.turns(),
-            };
+            let of = model.joint(joint);
+            let at = resting[joint.index()];
+            let (joint, turns) = (of.name.clone(), of.kind.turns());
+            let about = About::JointAtItsLimit { joint, at, turns };
             facts.push(Fact::new(place(), about));
         }
         recording.hold = without.iter().map(|j| (*j, resting[j.index()])).collect();

@@ -139,7 +139,7 @@ impl Known {
         if cameras::take(&mut inputs) {
             let with = ml::fit(state(&inputs), &inputs, &settings)?;
             if cameras::contradicted(&with, &fit, &settings) {
-                cameras::take_back(&mut inputs);
+                cameras::make_equal(&mut inputs);
             } else {
                 fit = with;
             }

@@ -69,7 +69,7 @@ pub fn take(inputs: &mut Inputs) -> bool {
 }
 
 /// Makes the noise of these markers equal again.
-pub fn take_back(inputs: &mut Inputs) {
+pub fn make_equal(inputs: &mut Inputs) {
     for loaded in inputs.recordings.values_mut() {
         for name in std::mem::take(&mut loaded.by_camera) {
             loaded.shapes.remove(&name);

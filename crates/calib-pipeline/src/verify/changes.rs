@@ -50,6 +50,10 @@ impl Beside {
 #[must_use]
 pub fn finding(inputs: &Inputs, fit: &MlFit, scan: &ChangeScan, beside: Beside) -> Option<Finding> {
     let change = scan.significant()?;
+    // What is fast at first looks like the effects of the joints that are swept first.
+    if matches!(change.moved, Moved::Settling(_)) && beside.physics.is_some() {
+        return None;
+    }
     let names = Names { inputs, fit };
     let finding = names.described(change)?;
     // The tracker that moved and the tracker that drifted have one name.
