@@ -132,6 +132,10 @@ fn before_cameras(
     equal: Fits,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Fits, PipelineError> {
+    // A long recording is copied only where it may have to come back.
+    if inputs.robot.profile.plan.cameras.is_empty() {
+        return Ok(equal);
+    }
     let before = (inputs.clone(), checked.tracks.clone());
     if !cameras::take(inputs) {
         return Ok(equal);
