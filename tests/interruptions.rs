@@ -244,6 +244,21 @@ fn simulate_and_convert() {
             next: &again(arguments, 0),
         });
     }
+    let more = || {
+        let dir = fresh();
+        let table = dir.read("robots/ripley/arm_poses.csv");
+        dir.file("june.csv", table)
+    };
+    let edit = &["init", "--edit", "robots/ripley.yaml", "june.csv"];
+    walk(&Trial {
+        name: "init --edit",
+        prepare: &more,
+        arguments: edit,
+        code: 0,
+        every: 11,
+        check: &old_or_new,
+        next: &again(edit, 0),
+    });
 }
 
 const TARGET: &str = "mine/r17.urdf";

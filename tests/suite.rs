@@ -23,6 +23,7 @@ mod holds_and_rows;
 mod hostile;
 mod hygiene;
 mod init;
+mod init_edit;
 mod inputs;
 mod interruptions;
 mod laboratory;

@@ -7,8 +7,9 @@ use calib_urdf::{LinkId, RobotModel, doubt};
 
 use crate::correct;
 use crate::error::InitError;
-use crate::fact::{About, CERTAIN, Fact, Mistake, Place, Residuals, Rival};
+use crate::fact::{About, CERTAIN, Fact, Place, Residuals, Rival};
 use crate::links::{Assigned, Choice, Scene, is_of_links};
+use crate::mistake::Mistake;
 use crate::robot;
 use crate::session::Draft;
 use crate::signs::{self, Signs};
@@ -22,9 +23,9 @@ pub struct Asked {
     pub assigned: Assigned,
 }
 
-/// Asks for links and mistakes; a body on the stated link, if one is stated.
+/// Asks for links and mistakes; a body on the stated link, if one is stated, and bodies of a profile that is edited (`fixed`) on theirs.
 #[must_use]
-pub fn ask(scene: &Scene<'_>, stated: Option<LinkId>) -> Asked {
+pub fn ask(scene: &Scene<'_>, stated: Option<LinkId>, fixed: &[(usize, LinkId)]) -> Asked {
     let none = Asked {
         choices: BTreeMap::new(),
         assigned: Assigned {
@@ -38,6 +39,7 @@ pub fn ask(scene: &Scene<'_>, stated: Option<LinkId>) -> Asked {
     };
     let chosen = (0..scene.bodies.len()).filter_map(|b| Some((b, scene.choose(&chain, b)?)));
     let choices: Vec<(usize, Choice)> = chosen.collect();
+    let is_fixed = |body: usize| fixed.iter().any(|(b, _)| *b == body);
     // The body that follows the stated link best is the one that was meant.
     let on_stated = stated.and_then(|link| {
         let group = robot::group(scene.model, link);
@@ -49,10 +51,11 @@ pub fn ask(scene: &Scene<'_>, stated: Option<LinkId>) -> Asked {
         };
         let best = choices
             .iter()
+            .filter(|(body, _)| !is_fixed(*body))
             .min_by(|a, b| rms(&a.1).total_cmp(&rms(&b.1)))?;
         Some((best.0, link))
     });
-    let stated: Vec<(usize, LinkId)> = on_stated.into_iter().collect();
+    let stated: Vec<(usize, LinkId)> = fixed.iter().copied().chain(on_stated).collect();
     let assigned = scene.assign(&chain, &choices, &stated);
     Asked {
         choices: choices.into_iter().collect(),
@@ -63,7 +66,12 @@ pub fn ask(scene: &Scene<'_>, stated: Option<LinkId>) -> Asked {
 impl Asked {
     /// The link of each body, with its runner-up.
     #[must_use]
-    pub fn facts(&self, scene: &Scene<'_>, stated: Option<LinkId>) -> Vec<Fact> {
+    pub fn facts(
+        &self,
+        scene: &Scene<'_>,
+        stated: Option<LinkId>,
+        fixed: &[(usize, LinkId)],
+    ) -> Vec<Fact> {
         let model = scene.model;
         let named = |link: LinkId| model.link(link).name.clone();
         let moving = scene.moving();
@@ -89,11 +97,18 @@ impl Asked {
                 rms: *rms,
             };
             let carried = robot::movers(model, *link);
-            let about = if stated == Some(*link) {
+            let better = || rivals().find(|(_, other)| CERTAIN * other < rms).map(rival);
+            let about = if fixed.iter().any(|(b, _)| b == body) {
+                About::LinkOfProfile {
+                    link: named(*link),
+                    rms: Some(rms),
+                    better: better(),
+                }
+            } else if stated == Some(*link) {
                 About::LinkStated {
                     link: named(*link),
                     rms: Some(rms),
-                    better: rivals().find(|(_, other)| CERTAIN * other < rms).map(rival),
+                    better: better(),
                 }
             } else if !carried.iter().any(|j| moving.contains(j)) {
                 About::Still {

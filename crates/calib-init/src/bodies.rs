@@ -32,9 +32,14 @@ const CALCULATED: f64 = 1.5e-6;
 /// Positions of a marker in the rows that are looked at.
 type Track = Vec<Option<Point3<f64>>>;
 
-/// The bodies of all files together, with the noise that their markers show. Bodies of markers have names that no link of the robot has.
+/// The bodies of all files together, with the noise that their markers show. Bodies of markers have names that no link of the robot has, nor any
+/// body of a profile that is edited (`known`).
 #[must_use]
-pub fn bodies(model: &RobotModel, sources: &[Source]) -> (Vec<Found>, Vec<Fact>) {
+pub fn bodies(
+    model: &RobotModel,
+    sources: &[Source],
+    known: &BTreeSet<String>,
+) -> (Vec<Found>, Vec<Fact>) {
     let mut facts = Vec::new();
     let mut tracks = tracks(sources);
     facts.extend(seldom(&mut tracks));
@@ -44,6 +49,7 @@ pub fn bodies(model: &RobotModel, sources: &[Source]) -> (Vec<Found>, Vec<Fact>)
     // A tracked pose keeps its name.
     let posed: BTreeSet<String> = streams(sources).map(|body| body.name.clone()).collect();
     let mut taken = posed.clone();
+    taken.extend(known.iter().cloned());
     let mut found = Vec::new();
     let mut noise: Option<(f64, usize)> = None;
     let mut calculated = false;
@@ -234,8 +240,10 @@ pub fn split(
     found: Vec<Found>,
     facts: &mut Vec<Fact>,
     apart: &[usize],
+    known: &BTreeSet<String>,
 ) -> Vec<Found> {
     let mut taken: BTreeSet<String> = found.iter().map(|body| body.name.clone()).collect();
+    taken.extend(known.iter().cloned());
     let mut new = Vec::new();
     for (i, body) in found.into_iter().enumerate() {
         if !apart.contains(&i) {

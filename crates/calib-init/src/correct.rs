@@ -5,8 +5,8 @@ use calib_recording::{AngleUnit, ColumnMap, LengthUnit};
 use calib_urdf::{JointKind, RobotModel, doubt};
 
 use crate::error::InitError;
-use crate::fact::Mistake;
 use crate::header::header;
+use crate::mistake::Mistake;
 use crate::name::{self, NamedUnit, Unit};
 use crate::session::Draft;
 use crate::source::Source;

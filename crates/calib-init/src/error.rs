@@ -172,6 +172,44 @@ pub enum InitError {
         /// Rows of both.
         rows: (usize, usize),
     },
+    /// The text of an edited profile has no place for what is to be added: its section is an alias, or written in an unusual way.
+    #[error(
+        "{file}: no place was found in `{section}` for what is to be added, so that nothing was changed\n  help: add these lines there:\n{}", .lines.join("\n")
+    )]
+    NotInserted {
+        /// The profile.
+        file: String,
+        /// Where the lines belong.
+        section: String,
+        /// The lines.
+        lines: Vec<String>,
+    },
+    /// Nothing was given to add to a profile.
+    #[error(
+        "{file}: no recording was given to add to it\n  help: give recordings: `calib init --edit {file} RECORDING...`"
+    )]
+    NothingToAdd {
+        /// The profile.
+        file: String,
+    },
+    /// A URDF was given beside a profile that names one.
+    #[error(
+        "{file}: a URDF was given, and the profile has its own (`robot.urdf: {of_profile}`)\n  help: leave it out, or correct `robot.urdf` in the profile first"
+    )]
+    SecondUrdf {
+        /// The URDF that was given.
+        file: String,
+        /// That of the profile.
+        of_profile: String,
+    },
+    /// The profile was changed by somebody else while it was edited.
+    #[error(
+        "{file}: the file changed while recordings were read; nothing was written\n  help: save it, and repeat the command"
+    )]
+    Changed {
+        /// The profile.
+        file: String,
+    },
     /// Two recordings are the same file.
     #[error("{file} is given twice\n  help: give every recording once")]
     Twice {
@@ -236,6 +274,10 @@ impl InitError {
             | Self::HandEye { file, .. }
             | Self::NothingTracked { file, .. }
             | Self::RowsDiffer { file, .. }
+            | Self::NotInserted { file, .. }
+            | Self::NothingToAdd { file }
+            | Self::SecondUrdf { file, .. }
+            | Self::Changed { file }
             | Self::Twice { file } => Some(file),
             Self::NoMotion { files, .. } | Self::NothingSeen { files } => {
                 files.first().map(String::as_str)

@@ -3,6 +3,8 @@
 use calib_recording::{AngleUnit, LengthUnit, TimeUnit};
 use serde::Serialize;
 
+use crate::mistake::Mistake;
+
 /// What a fact is about: a part of the profile.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "snake_case")]
@@ -49,89 +51,6 @@ pub enum LengthHow {
         /// m.
         reach: f64,
     },
-}
-
-/// A mistake in the recordings that explains them.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case", tag = "mistake")]
-pub enum Mistake {
-    /// A joint counts the other way.
-    Sign {
-        /// Its name.
-        joint: String,
-    },
-    /// The columns of two joints are exchanged.
-    Exchange {
-        /// Name of one.
-        first: String,
-        /// Name of the other.
-        second: String,
-    },
-    /// The unit of a joint's column, or of all columns of its kind.
-    Unit {
-        /// The joint; all where absent.
-        joint: Option<String>,
-        /// The unit that the values really have.
-        unit: &'static str,
-    },
-    /// The unit of the tracker's lengths.
-    TrackerUnit {
-        /// The unit that the values really have.
-        unit: &'static str,
-    },
-    /// A zero that is off by a multiple of 90°.
-    Offset {
-        /// The joint.
-        joint: String,
-        /// What must be added, deg.
-        degrees: f64,
-    },
-    /// Joint values and tracker rows are paired off by some rows.
-    Rows {
-        /// How many.
-        rows: i8,
-    },
-    /// The tracker's frame is left-handed.
-    Mirrored,
-    /// The tracker moved before some recordings.
-    TrackerMoved,
-    /// The body moved on its link before some recordings.
-    Remounted {
-        /// The body.
-        body: String,
-    },
-    /// A convention of poses was misread.
-    Poses,
-    /// A joint moved, and no column holds its readings.
-    MissingColumn {
-        /// The joint.
-        joint: String,
-    },
-    /// A joint without a column stood elsewhere than at 0.
-    StoodAt {
-        /// The joint.
-        joint: String,
-        /// Where it stood, rad or m.
-        value: f64,
-        /// Whether it turns.
-        turns: bool,
-    },
-    /// A body is on another link.
-    Link {
-        /// The body.
-        body: String,
-        /// The link.
-        link: String,
-    },
-    /// Two bodies are exchanged.
-    Bodies {
-        /// One.
-        first: String,
-        /// The other.
-        second: String,
-    },
-    /// Any other: `calib check` names it.
-    Other,
 }
 
 /// Residuals of the registration of all recordings to the nominal robot, rms, m.
@@ -195,6 +114,15 @@ pub enum About {
         /// The link.
         link: String,
         /// Its residual, rms, m; `None` without recordings.
+        rms: Option<f64>,
+        /// A link that explains the motion better by more than the engine's ratio.
+        better: Option<Rival>,
+    },
+    /// The profile that is edited names the link.
+    LinkOfProfile {
+        /// The link.
+        link: String,
+        /// Its residual, rms, m; `None` where no row shows the body with joints.
         rms: Option<f64>,
         /// A link that explains the motion better by more than the engine's ratio.
         better: Option<Rival>,
@@ -418,6 +346,37 @@ pub enum About {
         /// What errors of a nominal robot explain, m.
         limit: f64,
     },
+    /// A recording that the edited profile has already, with how to read it.
+    Listed,
+    /// The file of a recording of the edited profile took the place of one that does not exist.
+    Replaced {
+        /// The file that does not exist.
+        file: String,
+    },
+    /// The file of a recording of the edited profile does not exist.
+    Absent {
+        /// The file.
+        file: String,
+    },
+    /// No recording that was given shows a body of the edited profile.
+    NotSeen {
+        /// Its markers; empty: a tracked pose.
+        markers: Vec<String>,
+        /// Nor any other body of it.
+        none_is: bool,
+    },
+    /// Markers that keep their distances from those of a body of the edited profile, which does not have them.
+    MoreMarkers {
+        /// Their names.
+        markers: Vec<String>,
+    },
+    /// Noise of a marker coordinate that the edited profile states, and what the recordings show.
+    StatedSigma {
+        /// m.
+        stated: f64,
+        /// m.
+        shown: f64,
+    },
     /// Limits from the noise.
     Limits {
         /// Noise of a coordinate, m.
@@ -443,6 +402,8 @@ pub struct Fact {
 
 /// How many times worse the next best explanation must be before a guess counts as certain.
 pub const CERTAIN: f64 = 2.0;
+/// How many times larger or smaller than stated the noise must be before that is one to look at.
+const OTHER_NOISE: f64 = 1.5;
 
 impl Fact {
     /// A fact with the certainty that its values give it.
@@ -469,7 +430,9 @@ fn is_guess(about: &About) -> bool {
             let unusual = [unlimited, reversed, no_range, in_degrees];
             unusual.iter().any(|names| !names.is_empty())
         }
-        About::LinkStated { better, .. } => better.is_some(),
+        About::LinkStated { better, .. } | About::LinkOfProfile { better, .. } => better.is_some(),
+        About::NotSeen { none_is, .. } => *none_is,
+        About::StatedSigma { stated, shown } => (stated / shown).ln().abs() > OTHER_NOISE.ln(),
         About::Link {
             rms, next, same, ..
         } if !same.is_empty() || next.as_ref().is_some_and(|n| n.rms < CERTAIN * rms) => true,
@@ -490,6 +453,8 @@ fn is_guess(about: &About) -> bool {
         | About::Corrected { .. }
         | About::NotCorrected { .. }
         | About::TooLarge { .. }
+        | About::Absent { .. }
+        | About::MoreMarkers { .. }
         | About::Disagrees { .. }
         | About::Limits { .. }
         | About::NoLimits

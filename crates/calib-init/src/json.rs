@@ -3,12 +3,18 @@
 use calib_finding::{Finding, Severity};
 use serde_json::{Value, json};
 
+use crate::edit::Edited;
 use crate::proposal::Proposal;
 use crate::words;
 
-/// The facts with their places and sentences, the file, and what its check found; an object.
+/// The facts with their places and sentences, the file, what was added to it, and what its check found; an object.
 #[must_use]
-pub fn proposal(proposal: &Proposal, file: &str, findings: Option<&[Finding]>) -> Value {
+pub fn proposal(
+    proposal: &Proposal,
+    edited: Option<&Edited>,
+    file: &str,
+    findings: Option<&[Finding]>,
+) -> Value {
     let facts = proposal.facts.iter().map(|fact| {
         let mut value = serde_json::to_value(fact).unwrap_or_default();
         if let Some(object) = value.as_object_mut() {
@@ -23,8 +29,16 @@ pub fn proposal(proposal: &Proposal, file: &str, findings: Option<&[Finding]>) -
         let of = |f: &Finding| json!({"id": f.id.to_string(), "text": f.text()});
         errors.map(of).collect::<Vec<Value>>()
     });
+    let added = edited.map(|edited| {
+        json!({
+            "bodies": edited.bodies,
+            "recordings": edited.recordings,
+            "completed": edited.completed,
+        })
+    });
     json!({
         "profile": file,
+        "added": added,
         "robot": proposal.robot,
         "noise": proposal.noise,
         "facts": facts,

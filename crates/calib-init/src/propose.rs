@@ -1,16 +1,18 @@
 //! From a URDF and files to a proposal.
 
-use calib_recording::{LengthUnit, Poses};
-use calib_urdf::range::{range, resting_positions};
+use calib_recording::LengthUnit;
 use calib_urdf::{JointId, LinkId, RobotModel, doubt};
 
 use crate::ask::{apply_one, ask, next_correction};
 use crate::bodies::{self, Found};
 use crate::correct;
 use crate::error::InitError;
-use crate::fact::{About, AngleHow, Fact, LengthHow, Mistake, Place};
+use crate::fact::{About, AngleHow, Fact, LengthHow, Place};
+use crate::hold;
+use crate::known::Known;
 use crate::limits;
 use crate::links::Scene;
+use crate::mistake::Mistake;
 use crate::proposal::{Body, Noise, Proposal, Recording, Table};
 use crate::robot;
 use crate::session::{self, Draft, Use};
@@ -33,6 +35,8 @@ pub struct Request {
     pub markers_on: Option<String>,
     /// Where nothing was recorded: the folder of the recordings to be, relative to the profile.
     pub folder: String,
+    /// The profile that is edited; the proposal then has what it lacks, and its bodies.
+    pub known: Option<Known>,
 }
 
 /// Corrections that are tried one after the other: a table with more mistakes is one to look at.
@@ -64,6 +68,7 @@ pub fn propose(
                 })?,
         ),
     };
+    let known = request.known.as_ref();
     let mut proposal = Proposal {
         robot: robot_name(model, request),
         urdf: request.urdf_path.clone(),
@@ -72,12 +77,21 @@ pub fn propose(
         bodies: Vec::new(),
         recordings: Vec::new(),
         skeleton: None,
-        facts: of_robot(model),
+        facts: known.map_or_else(|| of_robot(model), |_| Vec::new()),
     };
-    if files.is_empty() {
+    if let Some(known) = known {
+        let (files, listed) = known.to_read(files);
+        proposal.facts.extend(listed);
+        if files.is_empty() {
+            proposal.facts.extend(known.of_files(&proposal));
+            return Ok(proposal);
+        }
+        with_recordings(model, &files, (stated, Some(known)), longest, &mut proposal)?;
+        proposal.facts.extend(known.of_files(&proposal));
+    } else if files.is_empty() {
         without_recordings(model, request, stated, longest, &mut proposal)?;
     } else {
-        with_recordings(model, files, stated, longest, &mut proposal)?;
+        with_recordings(model, files, (stated, None), longest, &mut proposal)?;
     }
     let about = match proposal.noise.marker.or(proposal.noise.body.map(|b| b.0)) {
         Some(sigma) => About::Limits { sigma },
@@ -88,7 +102,9 @@ pub fn propose(
         limits::of(&proposal.noise).is_none(),
         about == About::NoLimits
     );
-    proposal.facts.push(Fact::new(Place::Limits, about));
+    if known.is_none() {
+        proposal.facts.push(Fact::new(Place::Limits, about));
+    }
     Ok(proposal)
 }
 
@@ -205,27 +221,36 @@ fn without_recordings(
     Ok(())
 }
 
+/// All files, each once.
+fn read(
+    model: &RobotModel,
+    files: &[File],
+    known: Option<&Known>,
+) -> Result<Vec<Source>, InitError> {
+    let is_again = |(i, file): &(usize, &File)| files[..*i].iter().any(|o| o.path == file.path);
+    if let Some((_, file)) = files.iter().enumerate().find(is_again) {
+        return Err(InitError::Twice {
+            file: file.shown.clone(),
+        });
+    }
+    let renamed = known.map(|known| known.raw.names.clone());
+    let renamed = renamed.unwrap_or_default();
+    let read = files.iter().map(|f| Source::read(model, f, &renamed));
+    read.collect()
+}
+
 /// Everything from the files.
 fn with_recordings(
     model: &RobotModel,
     files: &[File],
-    stated: Option<LinkId>,
+    (stated, known): (Option<LinkId>, Option<&Known>),
     longest: &robot::Tip,
     proposal: &mut Proposal,
 ) -> Result<(), InitError> {
-    if let Some(twice) = files
-        .iter()
-        .enumerate()
-        .find(|(i, f)| files[..*i].iter().any(|o| o.path == f.path))
-    {
-        return Err(InitError::Twice {
-            file: twice.1.shown.clone(),
-        });
-    }
-    let read = files.iter().map(|file| Source::read(model, file));
-    let mut sources: Vec<Source> = read.collect::<Result<_, _>>()?;
-    let (mut drafts, mut of_files) = session::drafts(model, &sources)?;
-    let (mut found, mut of_bodies) = bodies::bodies(model, &sources);
+    let others = known.map(Known::others).unwrap_or_default();
+    let mut sources = read(model, files, known)?;
+    let (mut drafts, mut of_files) = session::drafts(model, &sources, &others)?;
+    let (mut found, mut of_bodies, mut fixed) = all_bodies(model, &sources, known);
     if found.is_empty() {
         return Err(InitError::NothingSeen {
             files: sources.iter().map(|s| s.file.shown.clone()).collect(),
@@ -233,12 +258,13 @@ fn with_recordings(
     }
     bodies::without_left_out(model, &mut sources, &of_bodies)?;
     let start = stated.unwrap_or_else(|| last_recorded(model, &sources).unwrap_or(longest.link));
-    proposal.bodies = on_link(&found, start);
+    proposal.bodies = on_link(&found, start, &fixed);
     proposal.recordings = recordings(&drafts, &sources);
     of_files.extend(tables::far_clocks(model, proposal, &mut drafts, &sources)?);
     proposal.recordings = recordings(&drafts, &sources);
     let mut poses = tables::tables(model, proposal, &drafts, &sources)?;
-    if stated.is_none() && poses.iter().all(|p| session::moved(model, p).is_empty()) {
+    let asks = stated.is_none() && fixed.len() < found.len();
+    if asks && poses.iter().all(|p| session::moved(model, p).is_empty()) {
         return Err(InitError::NoMotion {
             files: sources.iter().map(|s| s.file.shown.clone()).collect(),
             tip: model.link(longest.link).name.clone(),
@@ -256,7 +282,7 @@ fn with_recordings(
         corrections.push(fact);
         if let Some(new) = new {
             sources = new;
-            (found, of_bodies) = bodies::bodies(model, &sources);
+            (found, of_bodies, fixed) = all_bodies(model, &sources, known);
             proposal.recordings = recordings(&drafts, &sources);
             poses = tables::tables(model, proposal, &drafts, &sources)?;
         }
@@ -266,9 +292,11 @@ fn with_recordings(
         bodies: &found,
         tables: &poses,
     };
-    let apart = scene.not_rigid();
-    found = bodies::split(model, found, &mut of_bodies, &apart);
-    proposal.bodies = on_link(&found, start);
+    let mut apart = scene.not_rigid();
+    apart.retain(|body| *body >= fixed.len());
+    let names = known.map(Known::names_of_bodies).unwrap_or_default();
+    found = bodies::split(model, found, &mut of_bodies, &apart, &names);
+    proposal.bodies = on_link(&found, start, &fixed);
     let mut of_links = Vec::new();
     for _ in 0..=CORRECTIONS {
         let scene = Scene {
@@ -276,11 +304,11 @@ fn with_recordings(
             bodies: &found,
             tables: &poses,
         };
-        let asked = ask(&scene, stated);
+        let asked = ask(&scene, stated, &fixed);
         for (body, link) in &asked.assigned.on {
             proposal.bodies[*body].link = *link;
         }
-        of_links = asked.facts(&scene, stated);
+        of_links = asked.facts(&scene, stated, &fixed);
         let next = next_correction(&scene, &sources, &drafts, &asked.assigned)?;
         corrections.extend(next.facts);
         let Some(new) = next.sources.filter(|_| corrections.len() <= CORRECTIONS) else {
@@ -291,11 +319,15 @@ fn with_recordings(
         poses = tables::tables(model, proposal, &drafts, &sources)?;
     }
     without_corrected(&mut of_files, &mut corrections);
-    without_a_word(model, &proposal.bodies, &mut of_links);
-    let of_uses = session::uses(model, &mut drafts, &poses);
+    without_a_word(model, &proposal.bodies, &fixed, &mut of_links);
+    let mut of_uses = session::uses(model, &mut drafts, &poses, &others);
     proposal.recordings = recordings(&drafts, &sources);
-    let missing = missing(model, proposal, &poses);
+    let missing = hold::missing(model, proposal, &poses);
     proposal.noise = noise(&of_bodies);
+    if let Some(known) = known {
+        of_bodies = known.of_noise(of_bodies);
+        of_uses = known.of_new(of_uses);
+    }
     proposal
         .facts
         .extend([of_files, of_uses, of_bodies, of_links, missing, corrections].concat());
@@ -303,14 +335,42 @@ fn with_recordings(
 }
 
 /// Bodies of which nothing shows the link say so.
-fn without_a_word(model: &RobotModel, bodies: &[Body], of_links: &mut Vec<Fact>) {
-    for body in bodies {
+fn without_a_word(
+    model: &RobotModel,
+    bodies: &[Body],
+    fixed: &[(usize, LinkId)],
+    of_links: &mut Vec<Fact>,
+) {
+    for (i, body) in bodies.iter().enumerate() {
         let place = Place::Body(body.name.clone());
-        if !of_links.iter().any(|fact| fact.place == place) {
-            let link = model.link(body.link).name.clone();
-            of_links.push(Fact::new(place, About::LinkUnknown { link }));
+        if of_links.iter().any(|fact| fact.place == place) {
+            continue;
         }
+        let link = model.link(body.link).name.clone();
+        let about = match fixed.iter().any(|(b, _)| *b == i) {
+            true => About::LinkOfProfile {
+                link,
+                rms: None,
+                better: None,
+            },
+            false => About::LinkUnknown { link },
+        };
+        of_links.push(Fact::new(place, about));
     }
+}
+
+/// The bodies of all files, those of a profile that is edited first, with their links.
+fn all_bodies(
+    model: &RobotModel,
+    sources: &[Source],
+    known: Option<&Known>,
+) -> (Vec<Found>, Vec<Fact>, Vec<(usize, LinkId)>) {
+    let names = known.map(Known::names_of_bodies).unwrap_or_default();
+    let (mut found, mut facts) = bodies::bodies(model, sources, &names);
+    let fixed = known.map_or_else(Vec::new, |known| {
+        known.merge(sources, &mut found, &mut facts)
+    });
+    (found, facts, fixed)
 }
 
 /// Removes guesses of a unit that the motion corrected; what agrees then agrees with the corrections.
@@ -377,13 +437,16 @@ fn last_recorded(model: &RobotModel, sources: &[Source]) -> Option<LinkId> {
     Some(robot::group(model, child(last)))
 }
 
-fn on_link(found: &[Found], link: LinkId) -> Vec<Body> {
-    let on = |body: &Found| Body {
+fn on_link(found: &[Found], link: LinkId, fixed: &[(usize, LinkId)]) -> Vec<Body> {
+    let on = |(i, body): (usize, &Found)| Body {
         name: body.name.clone(),
         markers: body.markers.clone(),
-        link,
+        link: fixed
+            .iter()
+            .find(|(b, _)| *b == i)
+            .map_or(link, |(_, link)| *link),
     };
-    found.iter().map(on).collect()
+    found.iter().enumerate().map(on).collect()
 }
 
 fn recordings(drafts: &[Draft], sources: &[Source]) -> Vec<Recording> {
@@ -416,62 +479,4 @@ fn noise(facts: &[Fact]) -> Noise {
         }
     }
     noise
-}
-
-/// Joints that carry a body and have no column are held at 0 or at the end of their range that is nearest to it, and said.
-fn missing(model: &RobotModel, proposal: &mut Proposal, tables: &[Poses]) -> Vec<Fact> {
-    let mut facts = Vec::new();
-    let carriers = proposal
-        .bodies
-        .iter()
-        .flat_map(|body| robot::movers(model, body.link));
-    let mut carriers: Vec<JointId> = carriers.collect();
-    carriers.sort_unstable();
-    carriers.dedup();
-    let resting = at_rest(model);
-    for (recording, poses) in proposal.recordings.iter_mut().zip(tables) {
-        let without = carriers
-            .iter()
-            .filter(|j| !poses.joints.contains_key(&model.joint(**j).name));
-        let without: Vec<JointId> = without.copied().collect();
-        let place = || Place::Recording(recording.name.clone());
-        let (at_zero, elsewhere): (Vec<JointId>, Vec<JointId>) =
-            without.iter().partition(|j| resting[j.index()] == 0.0);
-        if !at_zero.is_empty() {
-            let joints = robot::names(model, &at_zero)
-                .iter()
-                .map(|n| (*n).to_owned())
-                .collect();
-            facts.push(Fact::new(place(), About::JointsMissing { joints }));
-        }
-        for &joint in &elsewhere {
-            let of = model.joint(joint);
-            let at = resting[joint.index()];
-            let (joint, turns) = (of.name.clone(), of.kind.turns());
-            let about = About::JointAtItsLimit { joint, at, turns };
-            facts.push(Fact::new(place(), about));
-        }
-        recording.hold = without.iter().map(|j| (*j, resting[j.index()])).collect();
-    }
-    facts
-}
-
-/// Where joints stand that nothing moves, as a profile states it: to a tenth of a degree or millimeter, within their limits.
-fn at_rest(model: &RobotModel) -> Vec<f64> {
-    let mut q = resting_positions(model);
-    for id in model.independent_joints() {
-        let unit = if model.joint(id).kind.turns() {
-            0.1_f64.to_radians()
-        } else {
-            1e-4
-        };
-        // Away from 0, which is beyond the limit.
-        let steps = q[id.index()] / unit;
-        let rounded = steps.abs().ceil().copysign(steps) * unit;
-        let within = range(model, id).is_none_or(|(low, high)| (low..=high).contains(&rounded));
-        if steps != 0.0 && within {
-            q[id.index()] = rounded;
-        }
-    }
-    q
 }

@@ -1,6 +1,6 @@
 //! Files become recordings: which log belongs to which tracker's file, what is a stream, what is swept, and what is held out.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_checks::sync::{HoldSettings, holds};
 use calib_recording::{Poses, Recording, Timeline};
@@ -48,6 +48,21 @@ pub struct Draft {
     pub usage: Use,
 }
 
+/// Recordings that a profile has already.
+#[derive(Debug, Clone, Default)]
+pub struct Others {
+    /// All of their names.
+    pub names: BTreeSet<String>,
+    /// The recording that has a file, by the file as [`File::path`](crate::File::path) names it.
+    pub by_file: BTreeMap<String, String>,
+    /// Names of those that have no file yet and do not say how to read one.
+    pub waiting: BTreeSet<String>,
+    /// One of those with a file is fitted.
+    pub fitted: bool,
+    /// One of those with a file is held out.
+    pub held_out: bool,
+}
+
 /// Longest time between two rows of a stream, s: slower tables are poses that somebody numbered by time.
 const STREAM_STEP: f64 = 0.25;
 /// Rows that make a stream.
@@ -64,6 +79,7 @@ const MOVES: (f64, f64) = (5e-3, 1e-3);
 pub fn drafts(
     model: &RobotModel,
     sources: &[Source],
+    others: &Others,
 ) -> Result<(Vec<Draft>, Vec<Fact>), InitError> {
     let only_joints: Vec<usize> = (0..sources.len())
         .filter(|i| sources[*i].has_joints() && !sources[*i].has_tracked())
@@ -95,7 +111,7 @@ pub fn drafts(
             columns: sources[*i].names.clone(),
         });
     }
-    let mut taken = BTreeSet::new();
+    let mut taken = others.names.clone();
     let mut drafts = Vec::new();
     let mut facts = Vec::new();
     for (i, source) in sources.iter().enumerate() {
@@ -104,7 +120,11 @@ pub fn drafts(
         }
         let pair = pairs.iter().find(|pair| pair.0 == i);
         let log = pair.map(|pair| pair.1);
-        let name = free_name(source.stem(), &mut taken);
+        let name = match others.by_file.get(&source.file.path) {
+            Some(name) => name.clone(),
+            None if waits(others, source, &drafts) => base_name(source.stem()),
+            None => free_name(source.stem(), &mut taken),
+        };
         let place = || Place::Recording(name.clone());
         let read = source
             .facts
@@ -237,7 +257,14 @@ fn stream(tracked: &Recording, joints: &Recording, two: bool) -> Option<(Stream,
     Some((kind, found))
 }
 
-fn free_name(stem: &str, taken: &mut BTreeSet<String>) -> String {
+/// A recording of the profile has the file's name, and no file yet.
+fn waits(others: &Others, source: &Source, drafts: &[Draft]) -> bool {
+    let name = base_name(source.stem());
+    others.waiting.contains(&name) && !drafts.iter().any(|draft| draft.name == name)
+}
+
+/// A file's name as that of a recording.
+fn base_name(stem: &str) -> String {
     let base: String = stem
         .chars()
         .map(|c| {
@@ -248,10 +275,14 @@ fn free_name(stem: &str, taken: &mut BTreeSet<String>) -> String {
             }
         })
         .collect();
-    let base = match base.trim_matches('_') {
+    match base.trim_matches('_') {
         "" => "recording".to_owned(),
         base => base.to_owned(),
-    };
+    }
+}
+
+fn free_name(stem: &str, taken: &mut BTreeSet<String>) -> String {
+    let base = base_name(stem);
     let numbered = (2..).map(|n| format!("{base}_{n}"));
     let mut names = std::iter::once(base.clone()).chain(numbered);
     let name = names.find(|name| !taken.contains(name)).unwrap_or(base);
@@ -297,10 +328,16 @@ const HELD_OUT: [&str; 9] = [
 /// Poses that a validation needs.
 const VALIDATION_ROWS: usize = 5;
 
-/// What each recording is for: by its name, by what it moves, and by its size.
+/// What each recording is for: by its name, by what it moves, and by its size, beside those of a profile that is edited.
 #[must_use]
-pub fn uses(model: &RobotModel, drafts: &mut [Draft], tables: &[Poses]) -> Vec<Fact> {
+pub fn uses(
+    model: &RobotModel,
+    drafts: &mut [Draft],
+    tables: &[Poses],
+    others: &Others,
+) -> Vec<Fact> {
     let mut facts = Vec::new();
+    let (fitted, held_out) = (others.fitted, others.held_out);
     let word = |name: &str| {
         let words = name::words(name);
         let joined = words.concat();
@@ -311,11 +348,11 @@ pub fn uses(model: &RobotModel, drafts: &mut [Draft], tables: &[Poses]) -> Vec<F
     let moved: Vec<_> = tables.iter().map(|poses| moved(model, poses)).collect();
     let is_sweep = |i: usize| (1..=2).contains(&moved[i].len());
     let by_name: Vec<Option<&'static str>> = drafts.iter().map(|d| word(&d.name)).collect();
-    let all_named = by_name.iter().all(Option::is_some);
+    let all_named = !fitted && by_name.iter().all(Option::is_some);
     let named = |i: usize| by_name[i].filter(|_| !all_named);
     let poses: Vec<usize> = (0..drafts.len()).filter(|i| !is_sweep(*i)).collect();
     let total: usize = poses.iter().map(|i| tables[*i].len()).sum();
-    let any_named = (0..drafts.len()).any(|i| named(i).is_some());
+    let any_named = held_out || (0..drafts.len()).any(|i| named(i).is_some());
     // The smallest of several recordings of many joints, if most poses stay for the fit.
     let smallest = poses
         .iter()
@@ -347,7 +384,7 @@ pub fn uses(model: &RobotModel, drafts: &mut [Draft], tables: &[Poses]) -> Vec<F
         drafts[i].usage = usage;
         facts.push(Fact::new(Place::Recording(drafts[i].name.clone()), about));
     }
-    if !drafts.iter().any(|d| d.usage == Use::Validation) {
+    if !held_out && !drafts.iter().any(|d| d.usage == Use::Validation) {
         facts.push(Fact::new(Place::Recordings, About::LeftOutInTurn));
     }
     facts

@@ -35,14 +35,21 @@ pub struct Source {
     pub facts: Vec<About>,
     /// Names of its columns or streams, for messages.
     pub names: Vec<String>,
+    /// The tracker's names of bodies and markers that the profile calls otherwise, by the profile's.
+    renamed: BTreeMap<String, String>,
 }
 
 impl Source {
-    /// Reads a file: by the readers' own rules where these give joints of this robot or a tracker's data, else by a map of its columns.
+    /// Reads a file: by the readers' own rules where these give joints of this robot or a tracker's data, else by a map of its columns. `renamed`: the
+    /// tracker's names of bodies and markers that the profile calls otherwise, by the profile's.
     ///
     /// # Errors
     /// [`InitError::Recording`] where neither reads it.
-    pub fn read(model: &RobotModel, file: &File) -> Result<Self, InitError> {
+    pub fn read(
+        model: &RobotModel,
+        file: &File,
+        renamed: &BTreeMap<String, String>,
+    ) -> Result<Self, InitError> {
         let own = read_bytes(&file.shown, &file.bytes, &ReadOptions::default());
         let table = header(&file.bytes);
         let guess = table.as_ref().map(|table| columns::guess(model, table));
@@ -53,7 +60,7 @@ impl Source {
                 if count > 0 {
                     facts.push(About::JointsByName { count });
                 }
-                Ok(Self::new(model, file, None, recording, facts))
+                Ok(Self::new(model, file, None, recording, facts, renamed))
             }
             (_, Some(guess)) if !guess.joints.is_empty() || has_tracked(&guess.map) => {
                 let recording = mapped(file, &guess.map)?;
@@ -63,9 +70,10 @@ impl Source {
                     Some(guess.map),
                     recording,
                     guess.facts,
+                    renamed,
                 ))
             }
-            (own, _) => Ok(Self::new(model, file, None, own?, Vec::new())),
+            (own, _) => Ok(Self::new(model, file, None, own?, Vec::new(), renamed)),
         }
     }
 
@@ -75,7 +83,9 @@ impl Source {
         columns: Option<ColumnMap>,
         mut recording: Recording,
         facts: Vec<About>,
+        renamed: &BTreeMap<String, String>,
     ) -> Self {
+        recording.rename(renamed);
         let joints = recording.joints.iter().map(|s| &s.name);
         let markers = recording.markers.iter().map(|s| &s.name);
         let bodies = recording.bodies.iter().map(|s| &s.name);
@@ -93,6 +103,7 @@ impl Source {
             recording,
             facts,
             names,
+            renamed: renamed.clone(),
         }
     }
 
@@ -109,6 +120,7 @@ impl Source {
             Some(columns),
             recording,
             facts,
+            &self.renamed,
         ))
     }
 

@@ -5,13 +5,19 @@ use std::fmt::Write as _;
 use calib_finding::{Finding, Severity};
 use calib_report::terminal::wrapped;
 
-use crate::fact::Fact;
+use crate::edit::Edited;
+use crate::fact::{About, Fact};
 use crate::proposal::Proposal;
 use crate::words;
 
-/// The summary; `file`: the profile that was written, `findings`: what its check found.
+/// The summary; `file`: the profile that was written or edited, `findings`: what its check found.
 #[must_use]
-pub fn summary(proposal: &Proposal, file: &str, findings: Option<&[Finding]>) -> String {
+pub fn summary(
+    proposal: &Proposal,
+    edited: Option<&Edited>,
+    file: &str,
+    findings: Option<&[Finding]>,
+) -> String {
     let mut text = String::new();
     let mut block = |title: &str, facts: &[&Fact]| {
         if !facts.is_empty() {
@@ -36,7 +42,7 @@ pub fn summary(proposal: &Proposal, file: &str, findings: Option<&[Finding]>) ->
     };
     let (to_check, found): (Vec<&Fact>, Vec<&Fact>) = proposal.facts.iter().partition(|f| f.check);
     block("Found", &found);
-    block("To check (marked CHECK in the file)", &to_check);
+    block(words::to_check(edited), &to_check);
     let all = findings.unwrap_or_default();
     let errors: Vec<&Finding> = all
         .iter()
@@ -52,6 +58,12 @@ pub fn summary(proposal: &Proposal, file: &str, findings: Option<&[Finding]>) ->
             }
         }
     }
-    let next = words::next(file, proposal.skeleton.is_some(), errors.len());
-    format!("Wrote {file}\n{text}\n{next}\n")
+    let is_absent = |fact: &&Fact| matches!(fact.about, About::Absent { .. });
+    let next = match proposal.facts.iter().any(|fact| is_absent(&fact)) {
+        true => words::next_of_absent(file),
+        false => words::next(file, proposal.skeleton.is_some(), errors.len()),
+    };
+    let wrote = wrapped(&words::wrote(file, edited), "", "  ");
+    let wrote = wrote.trim_end();
+    format!("{wrote}\n{text}\n{next}\n")
 }

@@ -1,11 +1,15 @@
 //! Every sentence of a proposal: in the profile's comments and on the terminal.
 
 mod joints;
+mod known;
+
+pub use known::{next_of_absent, to_check, wrote};
 
 use calib_finding::{Unit, number};
 use calib_recording::{AngleUnit, TimeUnit};
 
-use crate::fact::{About, AngleHow, LengthHow, Mistake, Residuals, Rival};
+use crate::fact::{About, AngleHow, LengthHow, Residuals, Rival};
+use crate::mistake::Mistake;
 use crate::yaml;
 
 /// The first lines of a profile.
@@ -119,6 +123,13 @@ pub fn sentence(about: &About) -> String {
             mm(*rms),
             mm(*limit)
         ),
+        About::LinkOfProfile { .. }
+        | About::Listed
+        | About::Replaced { .. }
+        | About::Absent { .. }
+        | About::NotSeen { .. }
+        | About::MoreMarkers { .. }
+        | About::StatedSigma { .. } => known::sentence(about),
         _ => of_session(about),
     }
 }

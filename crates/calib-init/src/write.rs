@@ -1,13 +1,13 @@
 //! The profile as text. What the program reads stands in the lines, what a person should know in comments above them.
 
+use calib_profile::edit::{Entry, Value};
 use calib_recording::ColumnMap;
-use calib_report::terminal::wrapped;
-use calib_urdf::{JointId, RobotModel, doubt};
+use calib_urdf::{RobotModel, doubt};
 
-use crate::fact::{Fact, Place};
+use crate::entry;
+use crate::fact::Place;
 use crate::limits;
-use crate::proposal::{Body, Proposal, Recording};
-use crate::session::{Stream, Use};
+use crate::proposal::{Body, Proposal};
 use crate::words;
 use crate::yaml;
 
@@ -47,26 +47,23 @@ impl Page<'_> {
         self.text.push('\n');
     }
 
+    fn lines(&mut self, lines: Vec<String>) {
+        lines.iter().for_each(|line| self.line(line));
+    }
+
     /// The facts about a part, as comments.
     fn comments(&mut self, indent: &str, place: &Place) {
-        let facts: Vec<&Fact> = self
-            .proposal
-            .facts
+        let comments = entry::comments(&self.proposal.facts, indent, place);
+        comments
             .iter()
-            .filter(|f| f.place == *place)
-            .collect();
-        for fact in facts {
-            let mark = if fact.check { "CHECK: " } else { "" };
-            let text = format!("{mark}{}", words::sentence(&fact.about));
-            self.comment(indent, &text);
-        }
+            .for_each(|line| self.line(&format!("{indent}{line}")));
     }
 
     fn comment(&mut self, indent: &str, text: &str) {
-        let (first, rest) = (format!("{indent}# "), format!("{indent}#   "));
-        let text = wrapped(text, &first, &rest);
-        self.text += text.trim_end();
-        self.text.push('\n');
+        let lines = entry::comment(indent, text);
+        lines
+            .iter()
+            .for_each(|line| self.line(&format!("{indent}{line}")));
     }
 
     fn head(&mut self) {
@@ -103,15 +100,19 @@ impl Page<'_> {
         self.line("");
         self.line("bodies:");
         for body in &self.proposal.bodies {
-            self.comments("  ", &Place::Body(body.name.clone()));
-            let link = yaml::text(&self.model.link(body.link).name);
-            let what = match body.markers.is_empty() {
-                true => "pose: true".to_owned(),
-                false => format!("markers: {}", yaml::list(&body.markers)),
-            };
-            let name = yaml::text(&body.name);
-            self.line(&format!("  {name}: {{link: {link}, {what}}}"));
+            let place = Place::Body(body.name.clone());
+            self.entry(&place, &body.name, entry::body(self.model, body));
         }
+    }
+
+    /// What a part has, after the facts about it.
+    fn entry(&mut self, place: &Place, name: &str, value: Value) {
+        let entry = Entry {
+            comments: entry::comments(&self.proposal.facts, "  ", place),
+            key: yaml::text(name),
+            value,
+        };
+        self.lines(entry.lines("  "));
     }
 
     fn recordings(&mut self) {
@@ -119,71 +120,22 @@ impl Page<'_> {
         self.comments("", &Place::Recordings);
         self.line("recordings:");
         let mut known: Vec<(&ColumnMap, String)> = Vec::new();
-        for recording in &self.proposal.recordings {
-            self.recording(recording, &mut known);
-        }
-    }
-
-    fn recording<'p>(
-        &mut self,
-        recording: &'p Recording,
-        known: &mut Vec<(&'p ColumnMap, String)>,
-    ) {
-        self.comments("  ", &Place::Recording(recording.name.clone()));
-        self.line(&format!("  {}:", yaml::text(&recording.name)));
-        self.line(&format!("    file: {}", yaml::text(&recording.table.path)));
-        match &recording.usage {
-            Use::Sweep(ranges) => {
-                self.line("    use: sweep");
-                let ranges = self.ranges(ranges);
-                self.line(&format!("    joints: {ranges}"));
-            }
-            Use::Static => self.line("    use: static"),
-            Use::Validation => self.line("    use: validation"),
-        }
-        if !recording.hold.is_empty() {
-            let at = |(joint, value): &(JointId, f64)| {
-                format!("{}: {}", self.key(*joint), self.value(*joint, *value))
+        let proposal = self.proposal;
+        for recording in &proposal.recordings {
+            let columns = |map| self.columns(map, &mut known);
+            let value = Value::Map {
+                anchor: None,
+                entries: entry::recording(self.model, recording, columns),
             };
-            let at: Vec<String> = recording.hold.iter().map(at).collect();
-            self.line(&format!("    hold: {{{}}}", at.join(", ")));
-        }
-        if let Some(columns) = &recording.table.columns {
-            self.columns("    ", columns, known);
-        }
-        if let Some(log) = &recording.log {
-            self.line("    robot_log:");
-            self.line(&format!("      file: {}", yaml::text(&log.path)));
-            if let Some(columns) = &log.columns {
-                self.columns("      ", columns, known);
-            }
-            if recording.stream.is_none() {
-                self.line("      rows: same");
-            }
-        }
-        let far = recording
-            .max_offset
-            .map(|s| format!(", max_offset_s: {s:.0}"));
-        let far = far.unwrap_or_default();
-        match recording.stream {
-            Some(Stream::Settle) => self.line(&format!("    timing: {{poses: settle{far}}}")),
-            Some(Stream::Continuous) => {
-                self.line(&format!("    timing: {{poses: continuous{far}}}"));
-            }
-            None => {}
+            let place = Place::Recording(recording.name.clone());
+            self.entry(&place, &recording.name, value);
         }
     }
 
     /// A column map, or the name of an equal one above.
-    fn columns<'p>(
-        &mut self,
-        indent: &str,
-        columns: &'p ColumnMap,
-        known: &mut Vec<(&'p ColumnMap, String)>,
-    ) {
-        if let Some((_, name)) = known.iter().find(|(other, _)| *other == columns) {
-            self.line(&format!("{indent}columns: *{name}"));
-            return;
+    fn columns<'p>(&self, map: &'p ColumnMap, known: &mut Vec<(&'p ColumnMap, String)>) -> Value {
+        if let Some((_, name)) = known.iter().find(|(other, _)| *other == map) {
+            return Value::Flow(format!("*{name}"));
         }
         let name = match known.len() {
             0 => "columns".to_owned(),
@@ -196,15 +148,12 @@ impl Page<'_> {
                 r.log.as_ref().and_then(|l| l.columns.as_ref()),
             ]
         });
-        let again = maps.flatten().filter(|other| *other == columns).count() > 1;
-        let anchor = if again {
-            format!(" &{name}")
-        } else {
-            String::new()
-        };
-        self.line(&format!("{indent}columns:{anchor}"));
-        self.text += &yaml::columns(columns, &format!("{indent}  "));
-        known.push((columns, name));
+        let again = maps.flatten().filter(|other| *other == map).count() > 1;
+        known.push((map, name.clone()));
+        Value::Map {
+            anchor: again.then_some(name),
+            entries: yaml::columns(map),
+        }
     }
 
     fn solve(&mut self) {
@@ -227,41 +176,13 @@ impl Page<'_> {
         }
     }
 
-    /// `elbow_deg`, `lift_mm`.
-    fn key(&self, joint: JointId) -> String {
-        let joint = self.model.joint(joint);
-        let unit = if joint.kind.turns() { "deg" } else { "mm" };
-        yaml::text(&format!("{}_{unit}", joint.name))
-    }
-
-    fn value(&self, joint: JointId, value: f64) -> String {
-        match self.model.joint(joint).kind.turns() {
-            true => yaml::number(value.to_degrees(), 1),
-            false => yaml::number(value * 1e3, 1),
-        }
-    }
-
-    /// `{elbow_deg: [-90, 90]}`.
-    fn ranges(&self, ranges: &[(JointId, (f64, f64))]) -> String {
-        let of = |(joint, (low, high)): &(JointId, (f64, f64))| {
-            format!(
-                "{}: [{}, {}]",
-                self.key(*joint),
-                self.value(*joint, *low),
-                self.value(*joint, *high)
-            )
-        };
-        let all: Vec<String> = ranges.iter().map(of).collect();
-        format!("{{{}}}", all.join(", "))
-    }
-
     /// Ranges for joints without limits; the others have those of the URDF.
     fn plan(&mut self) {
         let Some(skeleton) = &self.proposal.skeleton else {
             return;
         };
         let in_degrees = doubt::limits_in_degrees(self.model);
-        let open = |(joint, _): &&(JointId, _)| {
+        let open = |(joint, _): &&(_, _)| {
             doubt::range(self.model.joint(*joint)).is_none() || in_degrees.contains(joint)
         };
         let open: Vec<_> = skeleton.random.iter().filter(open).copied().collect();
@@ -270,7 +191,7 @@ impl Page<'_> {
         }
         self.line("");
         self.line("plan:");
-        let ranges = self.ranges(&open);
+        let ranges = entry::ranges(self.model, &open);
         self.line(&format!("  joints: {ranges}"));
     }
 
@@ -299,15 +220,15 @@ impl Page<'_> {
         }
         for (joint, (low, high)) in &skeleton.sweep {
             let (key, low, high) = (
-                self.key(*joint),
-                self.value(*joint, *low),
-                self.value(*joint, *high),
+                entry::key(self.model, *joint),
+                entry::value(self.model, *joint, *low),
+                entry::value(self.model, *joint, *high),
             );
             self.line(&format!(
                 "        - {{joint: {key}, from: {low}, to: {high}, poses: 6}}"
             ));
         }
-        let random = self.ranges(&skeleton.random);
+        let random = entry::ranges(self.model, &skeleton.random);
         for (name, poses) in [("poses", 40), ("checks", 12)] {
             self.line(&format!("    {name}:"));
             self.line(&format!("      random: {random}"));

@@ -1,8 +1,8 @@
 //! Values as YAML, in flow style.
 
 use std::collections::BTreeMap;
-use std::fmt::Write as _;
 
+use calib_profile::edit::Value;
 use calib_recording::{AngleUnit, BodyColumns, ColumnMap, Delimiter, LengthUnit, TimeUnit};
 
 /// A text, quoted where YAML would read something else.
@@ -60,14 +60,11 @@ fn map(values: &BTreeMap<String, String>) -> String {
     format!("{{{}}}", all.join(", "))
 }
 
-/// A column map as lines, each after `indent`.
+/// A column map: its keys with their values.
 #[must_use]
-pub fn columns(columns: &ColumnMap, indent: &str) -> String {
-    let mut out = String::new();
-    let mut line = |key: &str, value: String| {
-        // Writing to a String does not fail.
-        let _ = writeln!(out, "{indent}{key}: {value}");
-    };
+pub fn columns(columns: &ColumnMap) -> Vec<(String, Value)> {
+    let mut out = Vec::new();
+    let mut line = |key: &str, value: String| out.push((key.to_owned(), Value::Flow(value)));
     if columns.skip_lines > 0 {
         line("skip_lines", columns.skip_lines.to_string());
     }

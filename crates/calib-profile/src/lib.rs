@@ -18,6 +18,7 @@
 //! ```
 
 mod check;
+pub mod edit;
 mod error;
 mod locate;
 mod profile;

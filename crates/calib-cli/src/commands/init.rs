@@ -3,12 +3,17 @@
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
-use calib_files::{FileError, OutputFile, folder_of, input, make_folder, write_new};
-use calib_init::{File, HEAD, InitError, Request, json, not_a_urdf, propose, terminal, write};
+use calib_files::{FileError, OutputFile, folder_of, input, make_folder, replace, write_new};
+use calib_init::edit::{Edited, edited};
+use calib_init::{
+    About, Fact, File, HEAD, InitError, Known, Proposal, Request, json, not_a_urdf, propose,
+    terminal, write,
+};
 use calib_pipeline::ExitCode;
 use calib_pipeline::check;
 use calib_pipeline::options::Plugins;
 use calib_recording::ReadOptions;
+use calib_report::DataChecks;
 use calib_urdf::RobotModel;
 use clap::Args;
 
@@ -17,9 +22,13 @@ use crate::terminal::{Console, emit, spinner};
 
 /// Arguments of `calib init`.
 #[derive(Debug, Args)]
+#[command(
+    override_usage = "calib init [OPTIONS] <URDF> [RECORDINGS]...\n       calib init --edit <PROFILE> <RECORDINGS>..."
+)]
 pub struct Init {
-    /// The robot's URDF
-    urdf: PathBuf,
+    /// The robot's URDF; none with --edit
+    #[arg(required_unless_present = "edit")]
+    urdf: Option<PathBuf>,
     /// Recordings: tables with joints and markers, or a tracker's files and the robot's logs
     recordings: Vec<PathBuf>,
     /// The link that carries the markers [default: the link whose motion they follow, or the end of the longest chain]
@@ -28,18 +37,33 @@ pub struct Init {
     /// The profile to write; it must not exist [default: robots/ROBOT.yaml]
     #[arg(short, long)]
     out: Option<PathBuf>,
+    /// Add the recordings to this profile, with the bodies that it lacks; nothing that stands in it changes
+    #[arg(long, value_name = "PROFILE", conflicts_with = "out")]
+    edit: Option<PathBuf>,
 }
 
-/// Writes the profile, checks it, and says what it rests on.
+/// Writes or edits the profile, checks it, and says what it rests on.
 pub fn run(console: &Console, options: &Init) -> Result<ExitCode, CliError> {
+    match (&options.edit, &options.urdf) {
+        (Some(profile), first) => {
+            let given = first.iter().chain(&options.recordings);
+            edit(console, profile, given, options.markers_on.clone())
+        }
+        (None, Some(urdf)) => write(console, options, urdf),
+        // The arguments ask for one of them.
+        (None, None) => Ok(ExitCode::Usage),
+    }
+}
+
+fn write(console: &Console, options: &Init, urdf: &Path) -> Result<ExitCode, CliError> {
     let bar = spinner(console.quiet);
     bar.set_message("read the URDF");
-    let shown = options.urdf.display().to_string();
-    let model = robot(&options.urdf, &shown)?;
+    let shown = urdf.display().to_string();
+    let model = robot(urdf, &shown)?;
     let out = options
         .out
         .clone()
-        .unwrap_or_else(|| default_profile(&model, &options.urdf));
+        .unwrap_or_else(|| default_profile(&model, urdf));
     if out.symlink_metadata().is_ok() {
         return Err(FileError::Exists { path: out }.into());
     }
@@ -53,10 +77,11 @@ pub fn run(console: &Console, options: &Init) -> Result<ExitCode, CliError> {
     let request = Request {
         name: (model.name().is_empty()).then(|| stem.clone()),
         urdf_shown: shown,
-        urdf_path: relative(folder, &options.urdf),
+        urdf_path: relative(folder, urdf),
         schema: folder.join(schema).is_file().then(|| schema.to_owned()),
         markers_on: options.markers_on.clone(),
         folder: stem,
+        known: None,
     };
     let proposal = propose(&model, &request, &files)?;
     let text = write::profile(&model, &proposal);
@@ -72,18 +97,103 @@ pub fn run(console: &Console, options: &Init) -> Result<ExitCode, CliError> {
         false => Some(check::check(&out, Plugins::default())?),
     };
     bar.finish_and_clear();
-    let shown = out.display().to_string();
-    let findings = checked.as_ref().map(|c| c.findings.as_slice());
+    said(console, &proposal, None, &out, checked.as_ref())
+}
+
+/// Adds recordings to a profile.
+fn edit<'p>(
+    console: &Console,
+    profile: &Path,
+    given: impl Iterator<Item = &'p PathBuf>,
+    markers_on: Option<String>,
+) -> Result<ExitCode, CliError> {
+    let bar = spinner(console.quiet);
+    bar.set_message("read the profile");
+    let shown = profile.display().to_string();
+    let text = || {
+        let text = input::read_text(profile, LARGEST_PROFILE);
+        text.map_err(|source| {
+            let file = shown.clone();
+            InitError::Unread { file, source }
+        })
+    };
+    let old = text()?;
+    let folder = folder_of(profile);
+    let raw = calib_profile::parse(&old, &shown).map_err(InitError::from)?;
+    let urdf = folder.join(&raw.robot.urdf);
+    let model = robot(&urdf, &urdf.display().to_string())?;
+    let there = |path: &str| {
+        let path = folder.join(path);
+        (relative(folder, &path), path.is_file())
+    };
+    let known = Known::of(&model, &shown, &old, there).map_err(InitError::from)?;
+    bar.set_message("read the recordings");
+    let is_own = |path: &&PathBuf| relative(folder, path) == relative(folder, &urdf);
+    let given: Vec<&PathBuf> = given.filter(|path| !is_own(path)).collect();
+    if given.is_empty() {
+        return Err(InitError::NothingToAdd { file: shown }.into());
+    }
+    let files = given.into_iter().map(|path| file(folder, path));
+    let files: Vec<File> = files.collect::<Result<_, _>>()?;
+    if let Some(second) = files.iter().find(|file| is_robot(file)) {
+        let (file, of_profile) = (second.shown.clone(), raw.robot.urdf);
+        return Err(InitError::SecondUrdf { file, of_profile }.into());
+    }
+    bar.set_message("find joints, bodies and links");
+    let request = Request {
+        urdf_shown: urdf.display().to_string(),
+        urdf_path: raw.robot.urdf,
+        markers_on,
+        folder: stem(profile),
+        known: Some(known.clone()),
+        ..Request::default()
+    };
+    let proposal = propose(&model, &request, &files)?;
+    let edited = edited(&model, &proposal, &known)?;
+    if !edited.is_same() {
+        if text()? != old {
+            return Err(InitError::Changed { file: shown }.into());
+        }
+        replace(profile, edited.text.as_bytes())?;
+    }
+    bar.set_message("check the profile");
+    let is_absent = |fact: &Fact| matches!(fact.about, About::Absent { .. });
+    let checked = match proposal.facts.iter().any(is_absent) {
+        true => None,
+        false => Some(check::check(profile, Plugins::default())?),
+    };
+    bar.finish_and_clear();
+    said(console, &proposal, Some(&edited), profile, checked.as_ref())
+}
+
+/// A profile is written by hand; what is larger is another kind of file.
+const LARGEST_PROFILE: u64 = 1 << 20;
+
+/// The file is a URDF.
+fn is_robot(file: &File) -> bool {
+    let head = &file.bytes[..file.bytes.len().min(HEAD)];
+    String::from_utf8_lossy(head).contains("<robot")
+}
+
+/// Says what was found, and what the check says of it.
+fn said(
+    console: &Console,
+    proposal: &Proposal,
+    edited: Option<&Edited>,
+    profile: &Path,
+    checked: Option<&DataChecks>,
+) -> Result<ExitCode, CliError> {
+    let shown = profile.display().to_string();
+    let findings = checked.map(|c| c.findings.as_slice());
     emit(&match (console.json, console.quiet) {
         (true, _) => {
-            calib_report::json::pretty(&json::proposal(&proposal, &shown, findings)) + "\n"
+            let json = json::proposal(proposal, edited, &shown, findings);
+            calib_report::json::pretty(&json) + "\n"
         }
         (false, true) => format!("{shown}\n"),
-        (false, false) => terminal::summary(&proposal, &shown, findings),
+        (false, false) => terminal::summary(proposal, edited, &shown, findings),
     })?;
-    Ok(checked
-        .as_ref()
-        .map_or(ExitCode::Accepted, check::exit_code))
+    Ok(checked.map_or(ExitCode::Accepted, check::exit_code))
 }
 
 /// The robot; where the file is none, what it is instead.

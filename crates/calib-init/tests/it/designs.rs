@@ -1,6 +1,6 @@
 //! Bodies, links, units, order and sign over designs and bodies, and the uses of recordings.
 
-use calib_init::fact::Mistake;
+use calib_init::mistake::Mistake;
 use calib_init::session::{Stream, Use};
 use calib_init::{About, Fact, Proposal, tables};
 use calib_sim::Motion;

@@ -1,6 +1,9 @@
 //! What a table says in a way of its own: numbers for hidden markers, two reversed joints, clocks far apart, bodies named like links.
 
-use calib_init::fact::Mistake;
+use std::collections::BTreeMap;
+
+use calib_init::mistake::Mistake;
+use calib_init::session::Others;
 use calib_init::source::Source;
 use calib_init::{About, Fact, propose, session, tables, words};
 use calib_sim::Motion;
@@ -148,9 +151,11 @@ fn clocks_far_apart_are_brought_together_and_the_profile_says_how_far() {
         file("run_tracker", text(&both.tracker)),
         file("run_robot", text(&both.robot)),
     ];
-    let sources = given.iter().map(|f| Source::read(&arm(), f));
+    let sources = given
+        .iter()
+        .map(|f| Source::read(&arm(), f, &BTreeMap::new()));
     let sources: Vec<Source> = sources.collect::<Result<_, _>>().expect("tables");
-    let (drafts, _) = session::drafts(&arm(), &sources).expect("recordings");
+    let (drafts, _) = session::drafts(&arm(), &sources, &Others::default()).expect("recordings");
     let mut without = proposed(&given);
     without.recordings[0].max_offset = None;
     let error = tables::tables(&arm(), &without, &drafts, &sources).expect_err("too far");

@@ -1,6 +1,7 @@
 //! Tests of the public interface, one program.
 
 mod designs;
+mod edit;
 mod hidden;
 mod lab;
 mod refused;

@@ -1,6 +1,6 @@
 //! Units of length however they are stated, URDFs in other units, and two files with one row for every posture.
 
-use calib_init::fact::Mistake;
+use calib_init::mistake::Mistake;
 use calib_init::{About, File, InitError, Proposal, Request, propose, tables};
 use calib_recording::LengthUnit;
 use calib_urdf::RobotModel;
