@@ -83,6 +83,49 @@ fn a_profile_grows_with_its_recordings_and_keeps_what_its_author_wrote() {
     assert_eq!(json["profile"], "robots/arm.yaml");
 }
 
+/// The profile is written when its check stops: what was written is said as well.
+#[test]
+fn an_error_of_the_check_stands_beside_what_was_added() {
+    let dir = recorded().file("day1/old.csv", "no table\n").edit(
+        "robots/arm.yaml",
+        "  sweep:\n    file: arm/sweep.csv",
+        "  old: {file: ../day1/old.csv, use: static}\n  sweep:\n    file: arm/sweep.csv",
+    );
+    let files = ["day1/sweep.csv", "day1/poses.csv", "day1/checks.csv"];
+    let call = [&["init", "--edit", "robots/arm.yaml"], &files[..]].concat();
+    let ran = dir.calib_with(&call).expect(3);
+    let said = ran.words();
+    for words in [
+        "Edited robots/arm.yaml",
+        "Errors that `calib check` finds",
+        "old.csv",
+    ] {
+        assert!(said.contains(words), "{said}");
+    }
+    let ran = dir.calib_with(&[&call[..], &["--json"]].concat()).expect(3);
+    let errors = ran.json()["errors"].clone();
+    assert!(
+        errors[0]["text"]
+            .as_str()
+            .is_some_and(|text| text.contains("old.csv")),
+        "{errors}"
+    );
+}
+
+#[test]
+fn a_protected_profile_is_not_replaced() {
+    let dir = recorded();
+    let path = dir.path("robots/arm.yaml");
+    let mut permissions = path.metadata().expect("there").permissions();
+    permissions.set_readonly(true);
+    std::fs::set_permissions(&path, permissions).expect("own file");
+    let before = dir.read("robots/arm.yaml");
+    let ran = dir.calib(["init", "--edit", "robots/arm.yaml", "day1/poses.csv"]);
+    assert_eq!(ran.code, 7, "{}", ran.stderr);
+    assert!(ran.stderr.contains("write-protected"), "{}", ran.stderr);
+    assert_eq!(dir.read("robots/arm.yaml"), before);
+}
+
 #[test]
 fn recordings_that_are_not_there_are_named_with_what_to_do() {
     let dir = recorded();

@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use calib_checks::structural::{Chain, Correction, Decision, Hypothesis, RecordingIndex, Scoped};
+use calib_checks::structural::{
+    Chain, Correction, Decision, Hypothesis, Outcome, RecordingIndex, Scoped,
+};
 use calib_urdf::{LinkId, RobotModel, doubt};
 
 use crate::correct;
@@ -14,6 +16,9 @@ use crate::robot;
 use crate::session::Draft;
 use crate::signs::{self, Signs};
 use crate::source::Source;
+
+/// Below this, what errors of a nominal robot explain is the noise of a tracker, m.
+const OF_NOISE: f64 = 2e-3;
 
 /// Links for all bodies, with what the hypotheses say.
 pub struct Asked {
@@ -180,31 +185,11 @@ pub fn next_correction(
     {
         return Ok(by_signs);
     }
-    let named = match &outcome.decision {
-        Decision::Named(named) => named,
-        Decision::Undecided { .. } => {
-            let about = About::Disagrees {
-                rms: outcome.rms,
-                limit: limit.unwrap_or(0.0),
-            };
-            next.facts.push(Fact::new(Place::Recordings, about));
-            return Ok(next);
-        }
-        Decision::Consistent { .. } => {
-            let about = About::Agrees {
-                rms: outcome.rms,
-                rows: outcome.rows,
-                corrected: false,
-            };
-            next.facts.push(Fact::new(Place::Recordings, about));
-            return Ok(next);
-        }
-        Decision::TooFewData { .. } => {
-            let about = About::TooFew { rows: outcome.rows };
-            next.facts.push(Fact::new(Place::Recordings, about));
-            return Ok(next);
-        }
-        _ => return Ok(next),
+    let Decision::Named(named) = &outcome.decision else {
+        let about = unnamed(outcome, limit);
+        next.facts
+            .extend(about.map(|about| Fact::new(Place::Recordings, about)));
+        return Ok(next);
     };
     let residuals = Residuals {
         none: named.evidence.none,
@@ -242,6 +227,31 @@ pub fn next_correction(
         next.sources = applied.sources;
     }
     Ok(next)
+}
+
+/// What is said where no mistake is named.
+fn unnamed(outcome: &Outcome, limit: Option<f64>) -> Option<About> {
+    let (rms, rows) = (outcome.rms, outcome.rows);
+    let agrees = About::Agrees {
+        rms,
+        rows,
+        corrected: false,
+    };
+    match &outcome.decision {
+        // Where the robot's errors explain nothing, the limit is the noise that was assumed, and the tracker's may be larger.
+        Decision::Undecided { leading: None, .. }
+            if limit.is_some_and(|limit| limit < OF_NOISE && rms < CERTAIN * limit) =>
+        {
+            Some(agrees)
+        }
+        Decision::Undecided { .. } => Some(About::Disagrees {
+            rms,
+            limit: limit.unwrap_or(0.0),
+        }),
+        Decision::Consistent { .. } => Some(agrees),
+        Decision::TooFewData { .. } => Some(About::TooFew { rows }),
+        _ => None,
+    }
 }
 
 /// What is corrected.

@@ -1,14 +1,14 @@
 //! A profile's text with what a proposal adds to it. Everything that stands in it stays, byte for byte.
 
-use calib_profile::edit::{Entry, Value, with_entry, with_value};
-use calib_profile::raw::{RawProfile, RawRecording};
+use calib_profile::edit::{Entry, Value, with_comments, with_entry, with_value};
+use calib_profile::raw::{RawProfile, RawRecording, RawSimMount};
 use calib_urdf::RobotModel;
 
 use crate::entry;
 use crate::error::InitError;
-use crate::fact::Place;
+use crate::fact::{About, Fact, Place};
 use crate::known::Known;
-use crate::proposal::{Proposal, Recording};
+use crate::proposal::{Body, Proposal, Recording};
 use crate::write;
 use crate::yaml;
 
@@ -23,6 +23,8 @@ pub struct Edited {
     pub recordings: Vec<String>,
     /// Recordings whose entries were completed: they could not be read, or had no file.
     pub completed: Vec<String>,
+    /// What was invented.
+    pub facts: Vec<Fact>,
 }
 
 impl Edited {
@@ -48,7 +50,9 @@ pub fn edited(model: &RobotModel, proposal: &Proposal, known: &Known) -> Result<
             bodies: Vec::new(),
             recordings: Vec::new(),
             completed: Vec::new(),
+            facts: Vec::new(),
         },
+        said: false,
     };
     if proposal.recordings.is_empty() {
         return Ok(edit.done);
@@ -75,6 +79,8 @@ struct Edit<'a> {
     /// What the text must say.
     raw: RawProfile,
     done: Edited,
+    /// What is about all recordings stands in the text.
+    said: bool,
 }
 
 impl Edit<'_> {
@@ -89,9 +95,33 @@ impl Edit<'_> {
             self.raw.bodies.insert(body.name.clone(), new.clone());
             let value = entry::body(self.model, body);
             let place = Place::Body(body.name.clone());
-            self.insert(&["bodies"], &body.name, value, self.comments("  ", &place))?;
+            let comments = self.comments("  ", &place);
+            self.insert(&["bodies"], &body.name, value, comments)?;
             self.done.bodies.push(body.name.clone());
+            self.mount(body)?;
         }
+        Ok(())
+    }
+
+    /// A simulation has a mount for every body.
+    fn mount(&mut self, body: &Body) -> Result<(), InitError> {
+        let Some(simulate) = &mut self.raw.simulate else {
+            return Ok(());
+        };
+        let fixed = |at: [i32; 3]| at.map(f64::from);
+        let markers = body.markers.iter().enumerate();
+        let markers = markers.map(|(k, name)| (name.clone(), fixed(entry::marker_mm(k))));
+        let mount = RawSimMount {
+            xyz_mm: fixed(entry::MOUNT_MM),
+            rpy_deg: [0.0; 3],
+            markers_mm: markers.collect(),
+        };
+        simulate.mounts.insert(body.name.clone(), mount);
+        let fact = Fact::new(Place::Body(body.name.clone()), About::InventedMount);
+        let comments = entry::comments(std::slice::from_ref(&fact), "    ", &fact.place);
+        let path = ["simulate", "mounts"];
+        self.insert(&path, &body.name, entry::mount(body), comments)?;
+        self.done.facts.push(fact);
         Ok(())
     }
 
@@ -121,6 +151,14 @@ impl Edit<'_> {
             let of_file = [path[0], path[1], "file"];
             let old = &self.known.raw.recordings[name].file;
             let text = with_value(&self.done.text, &of_file, old, &file, &self.raw);
+            let text = text.and_then(|text| {
+                // What stood there stays as a comment.
+                let place = Place::Recording(name.clone());
+                let is_replaced = |f: &&Fact| matches!(f.about, About::Replaced { .. });
+                let facts = self.proposal.facts.iter().filter(is_replaced);
+                let facts: Vec<Fact> = facts.cloned().collect();
+                with_comments(&text, &path, &entry::comments(&facts, "  ", &place))
+            });
             self.done.text =
                 text.ok_or_else(|| self.no_place(&path, &[format!("file: {file}")]))?;
             changed = true;
@@ -155,8 +193,22 @@ impl Edit<'_> {
         })
     }
 
-    fn comments(&self, indent: &str, place: &Place) -> Vec<String> {
-        entry::comments(&self.proposal.facts, indent, place)
+    /// The facts about a part as comments; before the first recording those about all of them that a person must look at.
+    fn comments(&mut self, indent: &str, place: &Place) -> Vec<String> {
+        let is_recording = matches!(place, Place::Recording(_));
+        let first = is_recording && !std::mem::replace(&mut self.said, true);
+        let of_all = |fact: &&Fact| {
+            let is_of_call = matches!(fact.about, About::NoNewBody { .. });
+            let of_all = matches!(fact.place, Place::Recordings | Place::Tracker);
+            first && fact.check && of_all && !is_of_call
+        };
+        let facts = self.proposal.facts.iter();
+        let mut facts: Vec<Fact> = facts.filter(of_all).cloned().collect();
+        facts.iter_mut().for_each(|fact| fact.place = place.clone());
+        let others = self.proposal.facts.iter();
+        let others = others.filter(|f| !matches!(f.about, About::Replaced { .. }));
+        facts.extend(others.cloned());
+        entry::comments(&facts, indent, place)
     }
 
     fn insert(

@@ -42,6 +42,38 @@ pub fn body(model: &RobotModel, body: &Body) -> Value {
     Value::Flow(format!("{{link: {link}, {what}}}"))
 }
 
+/// Places of markers in a simulated body, mm: no three of the first four on a line, no symmetry.
+#[must_use]
+pub fn marker_mm(k: usize) -> [i32; 3] {
+    const FIRST: [[i32; 3]; 4] = [[0, 0, 0], [80, 0, 0], [20, 60, 0], [45, 20, 40]];
+    let further = || {
+        let k = i32::try_from(k).unwrap_or(i32::MAX / 100);
+        [90 + 10 * (k % 9), 7 * (k * k % 11), 5 * (k % 17)]
+    };
+    FIRST.get(k).copied().unwrap_or_else(further)
+}
+
+/// Where a simulated body is on its link, mm.
+pub const MOUNT_MM: [i32; 3] = [30, 20, 40];
+
+/// The mount of a body in a simulation.
+#[must_use]
+pub fn mount(body: &Body) -> Value {
+    let of = |at: [i32; 3]| format!("[{}, {}, {}]", at[0], at[1], at[2]);
+    let markers = body.markers.iter().enumerate();
+    let markers = markers.map(|(k, name)| format!("{}: {}", yaml::text(name), of(marker_mm(k))));
+    let markers: Vec<String> = markers.collect();
+    let mut entries = vec![("xyz_mm".to_owned(), Value::Flow(of(MOUNT_MM)))];
+    if !markers.is_empty() {
+        let markers = format!("{{{}}}", markers.join(", "));
+        entries.push(("markers_mm".to_owned(), Value::Flow(markers)));
+    }
+    Value::Map {
+        anchor: None,
+        entries,
+    }
+}
+
 /// A recording; `columns`: a column map as its value, by itself or by an alias.
 #[must_use]
 pub fn recording<'r>(
@@ -63,7 +95,13 @@ pub fn recording<'r>(
     }
     if !recording.hold.is_empty() {
         let at = |(joint, at): &(JointId, f64)| {
-            format!("{}: {}", key(model, *joint), value(model, *joint, *at))
+            let scale = if model.joint(*joint).kind.turns() {
+                1f64.to_degrees()
+            } else {
+                1e3
+            };
+            // As the profile states it elsewhere.
+            format!("{}: {}", key(model, *joint), yaml::number(at * scale, 6))
         };
         let at: Vec<String> = recording.hold.iter().map(at).collect();
         push("hold", Value::Flow(format!("{{{}}}", at.join(", "))));
@@ -127,4 +165,17 @@ pub fn ranges(model: &RobotModel, ranges: &[(JointId, (f64, f64))]) -> String {
     };
     let all: Vec<String> = ranges.iter().map(of).collect();
     format!("{{{}}}", all.join(", "))
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+
+    #[test]
+    fn markers_of_a_simulated_body_have_places_of_their_own() {
+        let places: BTreeSet<[i32; 3]> = (0..60).map(marker_mm).collect();
+        assert_eq!(places.len(), 60);
+    }
 }

@@ -174,7 +174,7 @@ pub enum InitError {
     },
     /// The text of an edited profile has no place for what is to be added: its section is an alias, or written in an unusual way.
     #[error(
-        "{file}: no place was found in `{section}` for what is to be added, so that nothing was changed\n  help: add these lines there:\n{}", .lines.join("\n")
+        "{file}: the text of `{section}` cannot be changed without changing something else (an alias, an anchor that others use, or an unusual style), so that nothing was written\n  help: write `{section}` out, then add there:\n{}", .lines.join("\n")
     )]
     NotInserted {
         /// The profile.
@@ -183,6 +183,28 @@ pub enum InitError {
         section: String,
         /// The lines.
         lines: Vec<String>,
+    },
+    /// A file alone is no recording, and the recordings that were given with it stand in the profile and say how to read theirs.
+    #[error(
+        "{file}: this file alone is no recording, and {} of the profile, which {} given with it, {} already how to read {} files\n  help: complete the entry in the profile by hand (`robot_log: {{file: …}}`), or delete it and repeat the command",
+        listed(.recordings),
+        if .recordings.len() == 1 { "was" } else { "were" },
+        if .recordings.len() == 1 { "says" } else { "say" },
+        if .recordings.len() == 1 { "its" } else { "their" }
+    )]
+    BesideListed {
+        /// The file.
+        file: String,
+        /// The recordings of the profile.
+        recordings: Vec<String>,
+    },
+    /// The profile may not be written.
+    #[error(
+        "{file}: the file is write-protected\n  help: allow writing (`chmod u+w {file}`), or edit a copy"
+    )]
+    Protected {
+        /// The profile.
+        file: String,
     },
     /// Nothing was given to add to a profile.
     #[error(
@@ -276,6 +298,8 @@ impl InitError {
             | Self::RowsDiffer { file, .. }
             | Self::NotInserted { file, .. }
             | Self::NothingToAdd { file }
+            | Self::BesideListed { file, .. }
+            | Self::Protected { file }
             | Self::SecondUrdf { file, .. }
             | Self::Changed { file }
             | Self::Twice { file } => Some(file),
@@ -296,8 +320,10 @@ impl InitError {
             | Self::HandEye { .. }
             | Self::NothingTracked { .. }
             | Self::RowsDiffer { .. }
+            | Self::BesideListed { .. }
             | Self::NothingSeen { .. }
             | Self::NoMotion { .. } => ExitCode::Data,
+            Self::Protected { .. } | Self::Changed { .. } => ExitCode::NotWritten,
             _ => ExitCode::Usage,
         }
     }

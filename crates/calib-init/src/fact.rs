@@ -1,5 +1,7 @@
 //! What was found, as data. [`words`](crate::words) makes the sentences.
 
+mod guess;
+
 use calib_recording::{AngleUnit, LengthUnit, TimeUnit};
 use serde::Serialize;
 
@@ -370,6 +372,36 @@ pub enum About {
         /// Their names.
         markers: Vec<String>,
     },
+    /// The use that the edited profile states for a recording whose file took the place of another does not fit the file.
+    OtherUse {
+        /// Joints that move in the file.
+        moved: usize,
+        /// Poses.
+        rows: usize,
+    },
+    /// A link was named for new bodies, and none is new.
+    NoNewBody {
+        /// The link.
+        link: String,
+    },
+    /// A joint without a column stands where other recordings of the edited profile hold it.
+    HeldAsElsewhere {
+        /// Its name.
+        joint: String,
+        /// Where, rad or m.
+        at: f64,
+        /// Whether it turns.
+        turns: bool,
+    },
+    /// Noise of bodies that the edited profile states, and what the recordings show: of a coordinate, m, and about an axis, rad.
+    StatedBodySigma {
+        /// As stated.
+        stated: (f64, f64),
+        /// As shown by a body that stands still.
+        shown: (f64, f64),
+    },
+    /// The mount of a new body in the simulation of the edited profile is invented.
+    InventedMount,
     /// Noise of a marker coordinate that the edited profile states, and what the recordings show.
     StatedSigma {
         /// m.
@@ -402,64 +434,16 @@ pub struct Fact {
 
 /// How many times worse the next best explanation must be before a guess counts as certain.
 pub const CERTAIN: f64 = 2.0;
-/// How many times larger or smaller than stated the noise must be before that is one to look at.
-const OTHER_NOISE: f64 = 1.5;
 
 impl Fact {
     /// A fact with the certainty that its values give it.
     #[must_use]
     pub fn new(place: Place, about: About) -> Self {
-        let check = is_guess(&about);
+        let check = guess::is_guess(&about);
         Self {
             place,
             about,
             check,
         }
-    }
-}
-
-fn is_guess(about: &About) -> bool {
-    match about {
-        About::Joints {
-            unlimited,
-            reversed,
-            no_range,
-            in_degrees,
-            ..
-        } => {
-            let unusual = [unlimited, reversed, no_range, in_degrees];
-            unusual.iter().any(|names| !names.is_empty())
-        }
-        About::LinkStated { better, .. } | About::LinkOfProfile { better, .. } => better.is_some(),
-        About::NotSeen { none_is, .. } => *none_is,
-        About::StatedSigma { stated, shown } => (stated / shown).ln().abs() > OTHER_NOISE.ln(),
-        About::Link {
-            rms, next, same, ..
-        } if !same.is_empty() || next.as_ref().is_some_and(|n| n.rms < CERTAIN * rms) => true,
-        About::Time { named, .. } => !named,
-        About::Log { named, rows, .. } => !named || rows.is_some(),
-        About::TipOfChain { .. }
-        | About::LinkUnknown { .. }
-        | About::TooFew { .. }
-        | About::JointsByOrder { .. }
-        | About::JointsMissing { .. }
-        | About::JointAtItsLimit { .. }
-        | About::Duplicate { .. }
-        | About::LostByNumber { .. }
-        | About::FarClocks { .. }
-        | About::Seldom { .. }
-        | About::Flat { .. }
-        | About::ValidationSmallest { .. }
-        | About::Corrected { .. }
-        | About::NotCorrected { .. }
-        | About::TooLarge { .. }
-        | About::Absent { .. }
-        | About::MoreMarkers { .. }
-        | About::Disagrees { .. }
-        | About::Limits { .. }
-        | About::NoLimits
-        | About::Invented => true,
-        // A unit by its range alone is confirmed by the registration or corrected by it.
-        _ => false,
     }
 }

@@ -1,5 +1,7 @@
 //! Joints without a column, and where they are taken to stand.
 
+use std::collections::BTreeMap;
+
 use calib_recording::Poses;
 use calib_urdf::range::{range, resting_positions};
 use calib_urdf::{JointId, RobotModel};
@@ -8,9 +10,15 @@ use crate::fact::{About, Fact, Place};
 use crate::proposal::Proposal;
 use crate::robot;
 
-/// Joints that carry a body and have no column are held at 0 or at the end of their range that is nearest to it, and said.
+/// Joints that carry a body and have no column are held where a profile that is edited holds them (`held`), else at 0 or at the end of their range
+/// that is nearest to it, and said.
 #[must_use]
-pub fn missing(model: &RobotModel, proposal: &mut Proposal, tables: &[Poses]) -> Vec<Fact> {
+pub fn missing(
+    model: &RobotModel,
+    proposal: &mut Proposal,
+    tables: &[Poses],
+    held: &BTreeMap<JointId, f64>,
+) -> Vec<Fact> {
     let mut facts = Vec::new();
     let carriers = proposal
         .bodies
@@ -26,8 +34,10 @@ pub fn missing(model: &RobotModel, proposal: &mut Proposal, tables: &[Poses]) ->
             .filter(|j| !poses.joints.contains_key(&model.joint(**j).name));
         let without: Vec<JointId> = without.copied().collect();
         let place = || Place::Recording(recording.name.clone());
-        let (at_zero, elsewhere): (Vec<JointId>, Vec<JointId>) =
-            without.iter().partition(|j| resting[j.index()] == 0.0);
+        let at = |joint: &JointId| held.get(joint).copied().unwrap_or(resting[joint.index()]);
+        let (at_zero, elsewhere): (Vec<JointId>, Vec<JointId>) = without
+            .iter()
+            .partition(|j| !held.contains_key(j) && resting[j.index()] == 0.0);
         if !at_zero.is_empty() {
             let joints = robot::names(model, &at_zero)
                 .iter()
@@ -37,12 +47,16 @@ pub fn missing(model: &RobotModel, proposal: &mut Proposal, tables: &[Poses]) ->
         }
         for &joint in &elsewhere {
             let of = model.joint(joint);
-            let at = resting[joint.index()];
+            let at = at(&joint);
+            let is_held = held.contains_key(&joint);
             let (joint, turns) = (of.name.clone(), of.kind.turns());
-            let about = About::JointAtItsLimit { joint, at, turns };
+            let about = match is_held {
+                true => About::HeldAsElsewhere { joint, at, turns },
+                false => About::JointAtItsLimit { joint, at, turns },
+            };
             facts.push(Fact::new(place(), about));
         }
-        recording.hold = without.iter().map(|j| (*j, resting[j.index()])).collect();
+        recording.hold = without.iter().map(|j| (*j, at(j))).collect();
     }
     facts
 }

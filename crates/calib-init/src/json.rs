@@ -1,8 +1,8 @@
 //! A proposal for programs.
 
-use calib_finding::{Finding, Severity};
 use serde_json::{Value, json};
 
+use crate::checked::Checked;
 use crate::edit::Edited;
 use crate::proposal::Proposal;
 use crate::words;
@@ -13,7 +13,7 @@ pub fn proposal(
     proposal: &Proposal,
     edited: Option<&Edited>,
     file: &str,
-    findings: Option<&[Finding]>,
+    checked: &Checked<'_>,
 ) -> Value {
     let facts = proposal.facts.iter().map(|fact| {
         let mut value = serde_json::to_value(fact).unwrap_or_default();
@@ -24,9 +24,9 @@ pub fn proposal(
         value
     });
     let facts: Vec<Value> = facts.collect();
-    let errors = findings.map(|all| {
-        let errors = all.iter().filter(|f| f.severity == Severity::Error);
-        let of = |f: &Finding| json!({"id": f.id.to_string(), "text": f.text()});
+    let errors = (!matches!(checked, Checked::Not)).then(|| {
+        let errors = checked.errors().into_iter();
+        let of = |(id, text): (Option<String>, String)| json!({"id": id, "text": text});
         errors.map(of).collect::<Vec<Value>>()
     });
     let added = edited.map(|edited| {

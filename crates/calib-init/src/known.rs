@@ -4,12 +4,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use calib_profile::ProfileError;
 use calib_profile::raw::{RawProfile, RawUse};
-use calib_urdf::{LinkId, RobotModel};
+use calib_recording::Poses;
+use calib_urdf::{JointId, LinkId, RobotModel};
 
 use crate::bodies::Found;
 use crate::fact::{About, Fact, Place};
 use crate::proposal::{Body, Proposal};
-use crate::session::Others;
+use crate::session::{self, Draft, Others, Use};
 use crate::source::{File, Source};
 
 /// A profile that is edited.
@@ -27,6 +28,8 @@ pub struct Known {
     files: BTreeMap<String, Vec<String>>,
     /// Recordings whose tracker's file does not exist.
     absent: BTreeSet<String>,
+    /// Joints that its recordings hold, all at the same position, rad or m.
+    held: BTreeMap<JointId, f64>,
 }
 
 impl Known {
@@ -41,8 +44,16 @@ impl Known {
         path: impl Fn(&str) -> (String, bool),
     ) -> Result<Self, ProfileError> {
         let raw = calib_profile::parse(text, shown)?;
+        let mut held = BTreeMap::new();
         if !raw.recordings.is_empty() {
-            calib_profile::check(&raw, text, shown, model)?;
+            let profile = calib_profile::check(&raw, text, shown, model)?;
+            let all = profile.recordings.values().flat_map(|r| &r.hold);
+            let all: Vec<(JointId, f64)> = all.map(|(joint, at)| (*joint, *at)).collect();
+            let is_only = |(joint, at): &&(JointId, f64)| {
+                all.iter()
+                    .all(|(other, value)| other != joint || value == at)
+            };
+            held.extend(all.iter().filter(is_only).copied());
         }
         let on = |(name, body): (&String, &calib_profile::raw::RawBody)| {
             Some(Body {
@@ -68,6 +79,7 @@ impl Known {
             bodies,
             files,
             absent,
+            held,
         })
     }
 
@@ -126,12 +138,24 @@ impl Known {
         self.bodies.iter().map(|body| body.name.clone()).collect()
     }
 
-    /// Files that are to be read, and the recordings that need none: their entries say how to read their files.
+    /// Joints that its recordings hold, all at the same position, rad or m.
     #[must_use]
-    pub fn to_read(&self, files: &[File]) -> (Vec<File>, Vec<Fact>) {
+    pub fn held(&self) -> &BTreeMap<JointId, f64> {
+        &self.held
+    }
+
+    /// Files that are to be read, and the recordings that need none: their entries say how to read their files, or these are read without.
+    #[must_use]
+    pub fn to_read(&self, model: &RobotModel, files: &[File]) -> (Vec<File>, Vec<Fact>) {
+        let is_of_contact = |name: &str| {
+            let mut contacts = self.raw.contacts.values();
+            contacts.any(|contact| contact.recordings.iter().any(|r| r == name))
+        };
         let settled = |file: &File| {
             let name = self.listed(&file.path)?;
-            (!self.is_bare(name)).then_some(name)
+            let label = self.raw.recordings.get(name)?.group.as_ref();
+            let is_open = self.is_bare(name) && !is_of_contact(name);
+            (!is_open || Source::reads(model, file, label)).then_some(name)
         };
         let names: BTreeSet<&str> = files.iter().filter_map(settled).collect();
         let of = |name: &str| Fact::new(Place::Recording(name.to_owned()), About::Listed);
@@ -141,7 +165,8 @@ impl Known {
     }
 
     /// The profile has a body of that name.
-    fn has_body(&self, name: &str) -> bool {
+    #[must_use]
+    pub fn has_body(&self, name: &str) -> bool {
         self.bodies.iter().any(|body| body.name == name)
     }
 
@@ -225,11 +250,18 @@ impl Known {
                 About::NotSeen { .. } => false,
                 _ => fact.place == Place::Body(body.name.clone()),
             };
+            let left_out = facts.iter().filter(|fact| is_found(fact));
+            let left_out = left_out.flat_map(|fact| match &fact.about {
+                About::Flat { left_out } => left_out.clone(),
+                _ => Vec::new(),
+            });
+            let left_out: Vec<String> = left_out.collect();
             facts.retain(|fact| !is_found(fact));
             let Some(owner) = owner else { continue };
             let more: Vec<String> = body
                 .markers
                 .iter()
+                .chain(&left_out)
                 .filter(|m| !all.contains_key(m))
                 .cloned()
                 .collect();
@@ -256,20 +288,39 @@ impl Known {
         self.absent().map(of).collect()
     }
 
-    /// The facts that are not about recordings of the profile.
+    /// What recordings are used for: of those of the profile only what contradicts it.
     #[must_use]
-    pub fn of_new(&self, mut facts: Vec<Fact>) -> Vec<Fact> {
+    pub fn of_new(
+        &self,
+        model: &RobotModel,
+        (drafts, tables): (&[Draft], &[Poses]),
+        mut facts: Vec<Fact>,
+    ) -> Vec<Fact> {
         facts.retain(|fact| match &fact.place {
             Place::Recording(name) => !self.raw.recordings.contains_key(name),
             _ => true,
         });
+        for (draft, poses) in drafts.iter().zip(tables) {
+            let Some(stated) = self.raw.recordings.get(&draft.name) else {
+                continue;
+            };
+            let is_sweep = matches!(draft.usage, Use::Sweep(_));
+            if stated.usage == RawUse::Sweep && !is_sweep {
+                let about = About::OtherUse {
+                    moved: session::moved(model, poses).len(),
+                    rows: poses.len(),
+                };
+                facts.push(Fact::new(Place::Recording(draft.name.clone()), about));
+            }
+        }
         facts
     }
 
     /// What the recordings show of the tracker's noise, beside what the profile states.
     #[must_use]
     pub fn of_noise(&self, facts: Vec<Fact>) -> Vec<Fact> {
-        let beside = |fact: Fact| match (&fact.about, self.raw.tracker.marker_sigma_mm) {
+        let tracker = &self.raw.tracker;
+        let beside = |fact: Fact| match (&fact.about, tracker.marker_sigma_mm) {
             (About::MarkerSigma { sigma, .. }, Some(stated)) => {
                 let about = About::StatedSigma {
                     stated: stated * 1e-3,
@@ -277,8 +328,24 @@ impl Known {
                 };
                 Some(Fact::new(fact.place, about))
             }
-            (About::MarkerSigma { .. }, None) => Some(fact),
-            (About::BodySigma { .. } | About::SigmaUnknown | About::Calculated, _) => None,
+            (About::SigmaUnknown | About::Calculated, _) => None,
+            (
+                About::BodySigma {
+                    position,
+                    orientation,
+                },
+                _,
+            ) => {
+                let shown = (*position, *orientation);
+                let about = match (tracker.body_sigma_mm, tracker.body_sigma_deg) {
+                    (Some(mm), Some(deg)) => About::StatedBodySigma {
+                        stated: (mm * 1e-3, deg.to_radians()),
+                        shown,
+                    },
+                    _ => fact.about,
+                };
+                Some(Fact::new(fact.place, about))
+            }
             _ => Some(fact),
         };
         facts.into_iter().filter_map(beside).collect()

@@ -2,8 +2,10 @@
 
 pub mod ask;
 pub mod bodies;
+pub mod checked;
 pub mod columns;
 pub mod correct;
+pub mod corrected;
 pub mod edit;
 pub mod entry;
 mod error;

@@ -18,6 +18,8 @@ use crate::robot;
 
 /// Another unit of length must divide the residual by this.
 const OTHER_UNIT: f64 = 5.0;
+/// Residuals of robots of meters are not known better, m.
+const ROUNDING: f64 = 1e-7;
 /// Noise of a pose, m and rad: what the pipeline takes where the profile states none.
 const POSE_SIGMA: (f64, f64) = (3e-4, 1e-3);
 /// Rows that a link is chosen from.
@@ -179,9 +181,11 @@ impl Scene<'_> {
     #[must_use]
     pub fn tracker_unit(&self, read_as: LengthUnit) -> Option<(Scoped, Residuals)> {
         let chain = Chain::from_model(self.model).ok()?;
+        // What is smaller than the rounding of the sums says nothing of a body that was made a thousand times smaller.
         let least = |body: usize, correction: Option<&Scoped>| {
             let all = self.residuals(&chain, body, correction)?;
-            all.into_iter().map(|(_, rms)| rms).min_by(f64::total_cmp)
+            let least = all.into_iter().map(|(_, rms)| rms).min_by(f64::total_cmp);
+            least.map(|rms| rms.max(ROUNDING))
         };
         let mut best: Option<(f64, Scoped, Residuals)> = None;
         // A URDF in millimeters makes every unit too small.

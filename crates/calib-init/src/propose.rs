@@ -1,18 +1,20 @@
 //! From a URDF and files to a proposal.
 
+use std::collections::BTreeMap;
+
 use calib_recording::LengthUnit;
 use calib_urdf::{JointId, LinkId, RobotModel, doubt};
 
 use crate::ask::{apply_one, ask, next_correction};
 use crate::bodies::{self, Found};
 use crate::correct;
+use crate::corrected;
 use crate::error::InitError;
-use crate::fact::{About, AngleHow, Fact, LengthHow, Place};
+use crate::fact::{About, Fact, Place};
 use crate::hold;
 use crate::known::Known;
 use crate::limits;
 use crate::links::Scene;
-use crate::mistake::Mistake;
 use crate::proposal::{Body, Noise, Proposal, Recording, Table};
 use crate::robot;
 use crate::session::{self, Draft, Use};
@@ -80,14 +82,26 @@ pub fn propose(
         facts: known.map_or_else(|| of_robot(model), |_| Vec::new()),
     };
     if let Some(known) = known {
-        let (files, listed) = known.to_read(files);
-        proposal.facts.extend(listed);
+        let (files, listed) = known.to_read(model, files);
         if files.is_empty() {
+            proposal.facts.extend(listed);
             proposal.facts.extend(known.of_files(&proposal));
             return Ok(proposal);
         }
-        with_recordings(model, &files, (stated, Some(known)), longest, &mut proposal)?;
+        let found = with_recordings(model, &files, (stated, Some(known)), longest, &mut proposal);
+        found.map_err(|error| beside_listed(error, &listed))?;
+        proposal.facts.extend(listed);
         proposal.facts.extend(known.of_files(&proposal));
+        let is_new = |body: &Body| !known.has_body(&body.name);
+        if let Some(link) = &request.markers_on
+            && !proposal.bodies.iter().any(is_new)
+        {
+            let link = link.clone();
+            let place = Place::Recordings;
+            proposal
+                .facts
+                .push(Fact::new(place, About::NoNewBody { link }));
+        }
     } else if files.is_empty() {
         without_recordings(model, request, stated, longest, &mut proposal)?;
     } else {
@@ -318,20 +332,44 @@ fn with_recordings(
         proposal.recordings = recordings(&drafts, &sources);
         poses = tables::tables(model, proposal, &drafts, &sources)?;
     }
-    without_corrected(&mut of_files, &mut corrections);
+    corrected::without_guesses(&mut of_files, &mut corrections);
     without_a_word(model, &proposal.bodies, &fixed, &mut of_links);
     let mut of_uses = session::uses(model, &mut drafts, &poses, &others);
     proposal.recordings = recordings(&drafts, &sources);
-    let missing = hold::missing(model, proposal, &poses);
+    let nothing = BTreeMap::new();
+    let held = known.map_or(&nothing, Known::held);
+    let missing = hold::missing(model, proposal, &poses, held);
+    if corrections.iter().any(corrected::is_correction) {
+        corrected::noise(&mut of_bodies, bodies::bodies(model, &sources, &names).1);
+    }
     proposal.noise = noise(&of_bodies);
     if let Some(known) = known {
         of_bodies = known.of_noise(of_bodies);
-        of_uses = known.of_new(of_uses);
+        of_uses = known.of_new(model, (&drafts, &poses), of_uses);
     }
     proposal
         .facts
         .extend([of_files, of_uses, of_bodies, of_links, missing, corrections].concat());
     Ok(())
+}
+
+/// An error of files that were given beside recordings of the profile, which were not read, says so.
+fn beside_listed(error: InitError, listed: &[Fact]) -> InitError {
+    let name = |fact: &Fact| match &fact.place {
+        Place::Recording(name) => Some(name.clone()),
+        _ => None,
+    };
+    match error {
+        InitError::NothingTracked { file, .. } | InitError::NoJoints { file, .. }
+            if !listed.is_empty() =>
+        {
+            InitError::BesideListed {
+                file,
+                recordings: listed.iter().filter_map(name).collect(),
+            }
+        }
+        other => other,
+    }
 }
 
 /// Bodies of which nothing shows the link say so.
@@ -371,47 +409,6 @@ fn all_bodies(
         known.merge(sources, &mut found, &mut facts)
     });
     (found, facts, fixed)
-}
-
-/// Removes guesses of a unit that the motion corrected; what agrees then agrees with the corrections.
-fn without_corrected(of_files: &mut Vec<Fact>, corrections: &mut [Fact]) {
-    let any = corrections
-        .iter()
-        .any(|f| matches!(f.about, About::Corrected { .. }));
-    for fact in corrections.iter_mut() {
-        if let About::Agrees { corrected, .. } = &mut fact.about {
-            *corrected = any;
-        }
-    }
-    for correction in corrections {
-        let About::Corrected { mistake, .. } = &correction.about else {
-            continue;
-        };
-        let is_wrong = |about: &About| match mistake {
-            Mistake::TrackerUnit { .. } => {
-                matches!(
-                    about,
-                    About::Lengths {
-                        how: LengthHow::Range { .. },
-                        ..
-                    }
-                )
-            }
-            Mistake::Unit { joint: None, unit } if matches!(*unit, "deg" | "rad") => {
-                matches!(
-                    about,
-                    About::Angles {
-                        how: AngleHow::Range { .. },
-                        ..
-                    }
-                )
-            }
-            _ => false,
-        };
-        let everywhere = !matches!(correction.place, Place::Recording(_));
-        let there = |fact: &Fact| everywhere || fact.place == correction.place;
-        of_files.retain(|fact| !(there(fact) && is_wrong(&fact.about)));
-    }
 }
 
 /// The unit of length that all tracked files are read in.

@@ -77,6 +77,25 @@ impl Source {
         }
     }
 
+    /// The readers' own rules find joints of this robot and what a tracker saw: nothing more is needed to read it. `label`: a column of texts.
+    #[must_use]
+    pub fn reads(model: &RobotModel, file: &File, label: Option<&String>) -> bool {
+        let labeled = |label: &String| ColumnMap {
+            labels: vec![label.clone()],
+            ..ColumnMap::default()
+        };
+        let options = ReadOptions {
+            columns: label.map(labeled),
+            ..ReadOptions::default()
+        };
+        let own = read_bytes(&file.shown, &file.bytes, &options);
+        own.is_ok_and(|recording| {
+            let mut joints = recording.joints.iter();
+            let tracked = recording.markers.len() + recording.bodies.len();
+            joints.any(|s| model.joint_id(&s.name).is_ok()) && tracked > 0
+        })
+    }
+
     fn new(
         model: &RobotModel,
         file: &File,

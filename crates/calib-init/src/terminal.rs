@@ -2,21 +2,21 @@
 
 use std::fmt::Write as _;
 
-use calib_finding::{Finding, Severity};
 use calib_report::terminal::wrapped;
 
+use crate::checked::Checked;
 use crate::edit::Edited;
 use crate::fact::{About, Fact};
 use crate::proposal::Proposal;
 use crate::words;
 
-/// The summary; `file`: the profile that was written or edited, `findings`: what its check found.
+/// The summary; `file`: the profile that was written or edited, `checked`: what its check found.
 #[must_use]
 pub fn summary(
     proposal: &Proposal,
     edited: Option<&Edited>,
     file: &str,
-    findings: Option<&[Finding]>,
+    checked: &Checked<'_>,
 ) -> String {
     let mut text = String::new();
     let mut block = |title: &str, facts: &[&Fact]| {
@@ -43,15 +43,14 @@ pub fn summary(
     let (to_check, found): (Vec<&Fact>, Vec<&Fact>) = proposal.facts.iter().partition(|f| f.check);
     block("Found", &found);
     block(words::to_check(edited), &to_check);
-    let all = findings.unwrap_or_default();
-    let errors: Vec<&Finding> = all
-        .iter()
-        .filter(|f| f.severity == Severity::Error)
-        .collect();
+    let errors = checked.errors();
     if !errors.is_empty() {
         text += "\nErrors that `calib check` finds\n";
-        for error in &errors {
-            let line = format!("{}: {}", error.id, error.text());
+        for (id, error) in &errors {
+            let line = match id {
+                Some(id) => format!("{id}: {error}"),
+                None => error.clone(),
+            };
             text += &wrapped(&line, "  ", "    ");
             if !text.ends_with('\n') {
                 text.push('\n');

@@ -115,8 +115,8 @@ pub fn sentence(about: &About) -> String {
             mm(*rms)
         ),
         About::TooFew { rows } => format!(
-            "{} are too few to test the order, signs and units of the joints.",
-            plural(*rows, "pose", "poses")
+            "{} too few to test the order, signs and units of the joints.",
+            plural(*rows, "pose is", "poses are")
         ),
         About::Disagrees { rms, limit } => format!(
             "The recordings fit the nominal robot to {} rms only; errors of 1° and 10 mm explain {}, and no single mistake explains it. See what `calib check` says.",
@@ -129,6 +129,11 @@ pub fn sentence(about: &About) -> String {
         | About::Absent { .. }
         | About::NotSeen { .. }
         | About::MoreMarkers { .. }
+        | About::OtherUse { .. }
+        | About::NoNewBody { .. }
+        | About::HeldAsElsewhere { .. }
+        | About::StatedBodySigma { .. }
+        | About::InventedMount
         | About::StatedSigma { .. } => known::sentence(about),
         _ => of_session(about),
     }

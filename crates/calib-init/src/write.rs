@@ -7,12 +7,10 @@ use calib_urdf::{RobotModel, doubt};
 use crate::entry;
 use crate::fact::Place;
 use crate::limits;
-use crate::proposal::{Body, Proposal};
+use crate::proposal::Proposal;
 use crate::words;
 use crate::yaml;
 
-/// Markers of a simulated body, mm: no three on a line, no symmetry.
-const MARKERS_MM: [[i32; 3]; 4] = [[0, 0, 0], [80, 0, 0], [20, 60, 0], [45, 20, 40]];
 /// Noise that a simulation assumes where none is known, mm: an optical tracker in a room.
 const SIMULATED_MM: f64 = 0.2;
 
@@ -207,7 +205,12 @@ impl Page<'_> {
         self.line("  tracker_from_root: {xyz_mm: [2000, 500, 0], rpy_deg: [0, 0, 150]}");
         self.line("  mounts:");
         for body in &proposal.bodies {
-            self.mount(body);
+            let entry = Entry {
+                comments: Vec::new(),
+                key: yaml::text(&body.name),
+                value: entry::mount(body),
+            };
+            self.lines(entry.lines("    "));
         }
         self.line("  errors: {joint_offset_deg: 0.3, axis_mm: 0.5, axis_deg: 0.1, mount_mm: 3, mount_deg: 2}");
         let marker = proposal.noise.marker.map_or(SIMULATED_MM, |m| m * 1e3);
@@ -234,16 +237,5 @@ impl Page<'_> {
             self.line(&format!("      random: {random}"));
             self.line(&format!("      poses: {poses}"));
         }
-    }
-
-    fn mount(&mut self, body: &Body) {
-        let name = yaml::text(&body.name);
-        self.line(&format!("    {name}:"));
-        self.line("      xyz_mm: [30, 20, 40]");
-        let of = |(name, at): (&String, &[i32; 3])| {
-            format!("{}: [{}, {}, {}]", yaml::text(name), at[0], at[1], at[2])
-        };
-        let markers: Vec<String> = body.markers.iter().zip(&MARKERS_MM).map(of).collect();
-        self.line(&format!("      markers_mm: {{{}}}", markers.join(", ")));
     }
 }

@@ -93,14 +93,33 @@ pub fn with_entry(
         indent: key.column.checked_sub(1)?,
         new_line: if text.contains("\r\n") { "\r\n" } else { "\n" },
     };
-    let is_block = value.line > key.line && !at.is_flow(value.line - 1, value.column - 1);
     let reads = |text: &String| parse(text, "").is_ok_and(|raw| raw == *expected);
-    if is_block {
-        let indent = " ".repeat(value.column - 1);
-        Some(at.in_block(entry, &indent)).filter(reads)
-    } else {
-        at.in_flow(entry).find(reads)
+    if at.is_flow(value.line.checked_sub(1)?, value.column.checked_sub(1)?) {
+        return at.in_flow(entry).find(reads);
     }
+    // A section without a value yet has its keys two characters further in.
+    let indent = match value.line > key.line {
+        true => value.column - 1,
+        false => key.column + 1,
+    };
+    Some(at.in_block(entry, &" ".repeat(indent))).filter(reads)
+}
+
+/// The text with comments above the line of the key at `path`. `None`: it would not read as before.
+#[must_use]
+pub fn with_comments(text: &str, path: &[&str], comments: &[String]) -> Option<String> {
+    let before = parse(text, "").ok()?;
+    let key = Places::of(text).key(path)?;
+    let lines: Vec<&str> = text.split_inclusive('\n').collect();
+    let at = key.line.checked_sub(1)?;
+    let indent = " ".repeat(indent_of(lines.get(at)?));
+    let new_line = if text.contains("\r\n") { "\r\n" } else { "\n" };
+    let comments = comments.iter().map(|c| format!("{indent}{c}{new_line}"));
+    let comments: String = comments.collect();
+    let text = format!("{}{comments}{}", lines[..at].concat(), lines[at..].concat());
+    parse(&text, "")
+        .is_ok_and(|raw| raw == before)
+        .then_some(text)
 }
 
 /// The text with another scalar in the place of `old` at `path`; every other byte is that of `text`. `None`: no text was found that reads as
@@ -200,13 +219,17 @@ impl Section<'_> {
         let above = above + &self.joined(comments.map(|c| format!("{indent}{c}")));
         let braces: Vec<usize> = rest.match_indices('}').map(|(at, _)| at).collect();
         let added = format!("{}: {}", entry.key, entry.value.flow());
-        braces.into_iter().map(move |brace| {
-            let (before, after) = rest.split_at(brace);
-            let comma = match before.trim_end().chars().last() {
-                Some('{') => "",
-                Some(',') => " ",
-                _ => ", ",
+        // The last entry may end with a comma, or there may be none: only one way reads as expected.
+        let ways = braces.into_iter().flat_map(|at| {
+            let ways = match rest[..at].trim_end().ends_with('{') {
+                true => ["", ", ", " "],
+                false => [", ", " ", ""],
             };
+            ways.map(|way| (at, way))
+        });
+        let ways: Vec<(usize, &str)> = ways.collect();
+        ways.into_iter().map(move |(brace, comma)| {
+            let (before, after) = rest.split_at(brace);
             let before = before.trim_end_matches(' ');
             // On a line of its own it is indented: a comment may end the line before.
             let lead = match before.ends_with('\n') {
@@ -309,6 +332,18 @@ mod tests {
             let text = format!("{HEAD}{before}{after}");
             let new = format!("{HEAD}# new:\n# Found.\n{before}{comma}{NEW}{after}");
             assert_eq!(added(&text), Some(new));
+        }
+    }
+
+    #[test]
+    fn a_section_without_entries_gets_its_first() {
+        const NEW: &str = "  # Found.\n  new:\n    file: n.csv\n    use: static\n";
+        for (before, after) in [
+            ("recordings:\n", ""),
+            ("recordings: # none\n", "\n# of solve\nsolve: {}\n"),
+        ] {
+            let text = format!("{HEAD}{before}{after}");
+            assert_eq!(added(&text), Some(format!("{HEAD}{before}{NEW}{after}")));
         }
     }
 

@@ -26,6 +26,8 @@ use super::twin::twin;
 const FEW_FREEDOM: f64 = 10.0;
 /// A change that leaves the residual below this part of what nominal errors explain is found, with its size, by a fit.
 const WITHIN_A_FIT: f64 = 0.8;
+/// Rows that must be left where rows are paired otherwise.
+const LEAST_ROWS: usize = 4;
 /// Rounds of screening: the set settles in one or two.
 const SCREENINGS: usize = 3;
 /// Leaders under which outliers are looked for, beside the data as they are.
@@ -59,6 +61,7 @@ pub fn explain(data: &Data, options: &Options) -> Result<Outcome, DataError> {
     };
     let (_, freedom) = Scan::new(work, &[]).freedom();
     let mut candidates = candidates(work);
+    candidates.retain(|c| leaves_rows(&c.0, rows.len()));
     if rows.len() < data.readings.len() {
         // The neighbor of a row is not among the rows that are left.
         candidates.retain(|c| !matches!(c.0, Hypothesis::RowShift { .. }));
@@ -101,6 +104,16 @@ pub fn explain(data: &Data, options: &Options) -> Result<Outcome, DataError> {
     outcome.screened = screened.iter().map(original).collect();
     beyond_hypotheses(data, (work, &screened), &mut outcome, options);
     Ok(outcome)
+}
+
+/// What pairs rows otherwise takes some out: a few that are left fit anything.
+fn leaves_rows(hypothesis: &Hypothesis, rows: usize) -> bool {
+    match hypothesis {
+        Hypothesis::RowShift { rows: shift } => {
+            rows >= LEAST_ROWS + usize::from(shift.unsigned_abs())
+        }
+        _ => true,
+    }
 }
 
 /// Decides, with the residual that nominal errors explain and what the data cannot show; the correction of the hypothesis that is named or leads.

@@ -1,8 +1,11 @@
 //! The residual of a registration that nominal errors explain, with C = σ_prior² per column and K = A_gᵀ(I − A_r A_r⁺)A_g:
 //!
 //! ```text
-//! E f = tr(C K) + σ² ν,   var f = 2 tr((C K)²)                    quantile of the matched gamma distribution
+//! E f = tr(C K) + σ² ν,   var f = 2 tr((C K)²) + 2 σ⁴ ν           quantile of the matched gamma distribution
 //! ```
+//!
+//! Where the noise is most of it (one joint that turns leaves nothing to the errors of the robot), its own scatter counts; where it is little, the
+//! quantile of the robot's errors on top of the mean of the noise is the larger one, and is taken.
 
 use nalgebra::DMatrix;
 
@@ -34,13 +37,18 @@ pub(crate) fn expected(
     }
     let noise = options.sigma * options.sigma * freedom;
     let (mean, variance) = (scaled.trace(), 2.0 * scaled.norm_squared());
-    // Wilson–Hilferty for the gamma distribution of shape k = mean²/variance
-    let shape = (mean * mean / variance.max(f64::MIN_POSITIVE)).max(1e-3);
-    let root = 1.0 - 1.0 / (9.0 * shape) + Z99 / (3.0 * shape.sqrt());
-    let high = mean * root.powi(3);
+    let of_noise = 2.0 * noise * noise / freedom;
+    let high = (quantile(mean, variance) + noise).max(quantile(mean + noise, variance + of_noise));
     let rms = |f: f64| (3.0 * f / freedom).sqrt();
     Some(Expected {
         rms: rms(mean + noise),
-        limit: rms(high + noise),
+        limit: rms(high),
     })
+}
+
+/// 99 % of the gamma distribution with this mean and variance, by Wilson and Hilferty: its shape is mean²/variance.
+fn quantile(mean: f64, variance: f64) -> f64 {
+    let shape = (mean * mean / variance.max(f64::MIN_POSITIVE)).max(1e-3);
+    let root = 1.0 - 1.0 / (9.0 * shape) + Z99 / (3.0 * shape.sqrt());
+    mean * root.powi(3)
 }

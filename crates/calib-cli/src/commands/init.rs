@@ -4,14 +4,15 @@ use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
 use calib_files::{FileError, OutputFile, folder_of, input, make_folder, replace, write_new};
+use calib_init::checked::Checked;
 use calib_init::edit::{Edited, edited};
 use calib_init::{
     About, Fact, File, HEAD, InitError, Known, Proposal, Request, json, not_a_urdf, propose,
     terminal, write,
 };
-use calib_pipeline::ExitCode;
 use calib_pipeline::check;
 use calib_pipeline::options::Plugins;
+use calib_pipeline::{ExitCode, PipelineError};
 use calib_recording::ReadOptions;
 use calib_report::DataChecks;
 use calib_urdf::RobotModel;
@@ -92,12 +93,9 @@ fn write(console: &Console, options: &Init, urdf: &Path) -> Result<ExitCode, Cli
     );
     write_new(folder, &[OutputFile::text(name, text)])?;
     bar.set_message("check the profile");
-    let checked = match files.is_empty() {
-        true => None,
-        false => Some(check::check(&out, Plugins::default())?),
-    };
+    let checked = (!files.is_empty()).then(|| check::check(&out, Plugins::default()));
     bar.finish_and_clear();
-    said(console, &proposal, None, &out, checked.as_ref())
+    said(console, &proposal, None, &out, checked)
 }
 
 /// Adds recordings to a profile.
@@ -111,10 +109,14 @@ fn edit<'p>(
     bar.set_message("read the profile");
     let shown = profile.display().to_string();
     let text = || {
-        let text = input::read_text(profile, LARGEST_PROFILE);
-        text.map_err(|source| {
+        let bytes = input::read(profile, LARGEST_PROFILE).map_err(|source| {
             let file = shown.clone();
             InitError::Unread { file, source }
+        })?;
+        String::from_utf8(bytes).map_err(|error| {
+            let offset = error.utf8_error().valid_up_to();
+            let path = shown.clone();
+            InitError::from(PipelineError::NotText { path, offset })
         })
     };
     let old = text()?;
@@ -148,26 +150,28 @@ fn edit<'p>(
         known: Some(known.clone()),
         ..Request::default()
     };
-    let proposal = propose(&model, &request, &files)?;
-    let edited = edited(&model, &proposal, &known)?;
+    let mut proposal = propose(&model, &request, &files)?;
+    let mut edited = edited(&model, &proposal, &known)?;
+    proposal.facts.append(&mut edited.facts);
     if !edited.is_same() {
         if text()? != old {
             return Err(InitError::Changed { file: shown }.into());
+        }
+        if profile.metadata().is_ok_and(|m| m.permissions().readonly()) {
+            return Err(InitError::Protected { file: shown }.into());
         }
         replace(profile, edited.text.as_bytes())?;
     }
     bar.set_message("check the profile");
     let is_absent = |fact: &Fact| matches!(fact.about, About::Absent { .. });
-    let checked = match proposal.facts.iter().any(is_absent) {
-        true => None,
-        false => Some(check::check(profile, Plugins::default())?),
-    };
+    let is_whole = !proposal.facts.iter().any(is_absent);
+    let checked = is_whole.then(|| check::check(profile, Plugins::default()));
     bar.finish_and_clear();
-    said(console, &proposal, Some(&edited), profile, checked.as_ref())
+    said(console, &proposal, Some(&edited), profile, checked)
 }
 
-/// A profile is written by hand; what is larger is another kind of file.
-const LARGEST_PROFILE: u64 = 1 << 20;
+/// Read at most; what is too long for a profile is said where it is parsed.
+const LARGEST_PROFILE: u64 = 1 << 26;
 
 /// The file is a URDF.
 fn is_robot(file: &File) -> bool {
@@ -181,19 +185,27 @@ fn said(
     proposal: &Proposal,
     edited: Option<&Edited>,
     profile: &Path,
-    checked: Option<&DataChecks>,
+    checked: Option<Result<DataChecks, PipelineError>>,
 ) -> Result<ExitCode, CliError> {
     let shown = profile.display().to_string();
-    let findings = checked.map(|c| c.findings.as_slice());
+    // The profile stands written: an error of its check is said beside what was found.
+    let (code, findings) = match &checked {
+        None => (ExitCode::Accepted, Checked::Not),
+        Some(Ok(checks)) => (
+            check::exit_code(checks),
+            Checked::Findings(&checks.findings),
+        ),
+        Some(Err(error)) => (error.exit_code(), Checked::Stopped(error.to_string())),
+    };
     emit(&match (console.json, console.quiet) {
         (true, _) => {
-            let json = json::proposal(proposal, edited, &shown, findings);
+            let json = json::proposal(proposal, edited, &shown, &findings);
             calib_report::json::pretty(&json) + "\n"
         }
         (false, true) => format!("{shown}\n"),
-        (false, false) => terminal::summary(proposal, edited, &shown, findings),
+        (false, false) => terminal::summary(proposal, edited, &shown, &findings),
     })?;
-    Ok(checked.map_or(ExitCode::Accepted, check::exit_code))
+    Ok(code)
 }
 
 /// The robot; where the file is none, what it is instead.

@@ -2,7 +2,7 @@
 
 use calib_finding::{Unit, number};
 
-use super::{mm, quoted};
+use super::{mm, plural, quoted};
 use crate::edit::Edited;
 use crate::fact::About;
 
@@ -68,6 +68,29 @@ pub(super) fn sentence(about: &About) -> String {
                 "they are"
             },
         ),
+        About::OtherUse { moved, rows } => format!(
+            "The entry's `use` was stated for another file: in this one {} in {}.",
+            plural(*moved, "joint moves", "joints move"),
+            plural(*rows, "pose", "poses")
+        ),
+        About::NoNewBody { link } => {
+            format!("No body of these recordings is new: `--markers-on {link}` has no use.")
+        }
+        About::HeldAsElsewhere { joint, at, turns } => format!(
+            "`{joint}` has no column: it is taken to stand at {}, where other recordings of the profile hold it.",
+            number::plain(*at, if *turns { Unit::Radian } else { Unit::Meter })
+        ),
+        About::StatedBodySigma { stated, shown } => format!(
+            "A body that stands still scatters by {} and {}; the profile states {} and {}.",
+            number::plain(shown.0, Unit::Meter),
+            number::plain(shown.1, Unit::Radian),
+            number::plain(stated.0, Unit::Meter),
+            number::plain(stated.1, Unit::Radian)
+        ),
+        About::InventedMount => {
+            "The mount of this body in the simulation is invented: put in what you expect."
+                .to_owned()
+        }
         About::StatedSigma { stated, shown } => format!(
             "The markers scatter about their bodies by {} per coordinate; the profile states {}.",
             number::plain(*shown, Unit::Meter),

@@ -149,6 +149,146 @@ fn bodies_that_the_profile_lacks_are_added_on_their_links() {
     }
 }
 
+/// One joint that turns fits many links, signs and units: the profile says which are right, and nothing is corrected.
+#[test]
+fn sweeps_of_one_joint_alone_change_nothing_but_the_list() {
+    for (k, kind) in KINDS.into_iter().enumerate() {
+        let made = recordings(&[("hand", "link_6", kind)], Design::Sweeps, 20 + k as u64);
+        let known = known(&profiles(&body(kind, "link_6"))[0], &[]);
+        for (name, poses) in &made {
+            let (proposal, done) = edit(&known, &[file(&format!("s_{name}"), text(poses))]);
+            let what = format!("{kind:?} {name}: {:?}", proposal.facts);
+            let wrong = |fact: &&Fact| match &fact.about {
+                About::LinkOfProfile { better, .. } => better.is_some(),
+                About::Corrected { .. } | About::NotCorrected { .. } | About::Disagrees { .. } => {
+                    true
+                }
+                _ => false,
+            };
+            let wrong: Vec<&Fact> = proposal.facts.iter().filter(wrong).collect();
+            assert!(wrong.is_empty(), "{wrong:?}: {what}");
+            let raw = calib_profile::parse(&done.text, "lab.yaml").expect("a profile");
+            assert!(
+                raw.recordings[&format!("s_{name}")].columns.is_none(),
+                "{what}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_few_rows_are_too_few_for_any_mistake() {
+    let made = recordings(&[("hand", "link_6", Kind::Markers(4))], Design::Random, 31);
+    let known = known(&profiles(&body(Kind::Markers(4), "link_6"))[0], &[]);
+    let table = text(&made["poses"]);
+    let lines: Vec<&str> = table.lines().filter(|l| !l.starts_with('#')).collect();
+    for rows in 4..8 {
+        let few = file("few", lines[..=rows].join("\n") + "\n");
+        let (proposal, done) = edit(&known, &[few]);
+        let is_mistake = |fact: &&Fact| {
+            matches!(
+                fact.about,
+                About::Corrected { .. } | About::NotCorrected { .. }
+            )
+        };
+        let mistakes: Vec<&Fact> = proposal.facts.iter().filter(is_mistake).collect();
+        assert!(mistakes.is_empty(), "{rows}: {mistakes:?}");
+        assert_eq!(done.recordings, ["few"]);
+    }
+}
+
+/// A mistake of all recordings stands above the first new entry, to be checked.
+#[test]
+fn corrections_are_marked_in_the_file() {
+    let made = recordings(&[("hand", "link_6", Kind::Markers(4))], Design::Random, 32);
+    let known = known(&profiles(&body(Kind::Markers(4), "link_6"))[0], &[]);
+    let turned = |poses: &Poses| {
+        crate::lab::with_cells(&text(poses), |column, cell| {
+            match (column, cell.parse::<f64>()) {
+                ("joint_2_deg", Ok(q)) => (-q).to_string(),
+                _ => cell.to_owned(),
+            }
+        })
+    };
+    let files = [
+        file("june", turned(&made["poses"])),
+        file("july", turned(&made["more"])),
+    ];
+    let (_, done) = edit(&known, &files);
+    let raw = calib_profile::parse(&done.text, "lab.yaml").expect("a profile");
+    for name in ["june", "july"] {
+        let columns = raw.recordings[name].columns.as_ref().expect("corrected");
+        assert_eq!(columns.reversed, ["joint_2"], "{}", done.text);
+    }
+    assert!(
+        done.text
+            .contains("# CHECK: Joint `joint_2` counts against the axis"),
+        "{}",
+        done.text
+    );
+}
+
+#[test]
+fn joints_without_a_column_stand_where_the_profile_holds_them() {
+    let made = recordings(&[("hand", "link_6", Kind::Markers(4))], Design::Sweeps, 33);
+    // Joint 1 stands at 20° in this sweep.
+    let table = text(&made["turn_3"]);
+    let without: String = table
+        .lines()
+        .filter(|l| !l.starts_with('#'))
+        .map(|line| {
+            let cells: Vec<&str> = line.split(',').collect();
+            let at = table
+                .lines()
+                .find(|l| !l.starts_with('#'))
+                .expect("a header")
+                .split(',')
+                .position(|c| c == "joint_1_deg")
+                .expect("there");
+            let kept: Vec<&str> = cells
+                .iter()
+                .enumerate()
+                .filter(|(i, _)| *i != at)
+                .map(|(_, c)| *c)
+                .collect();
+            kept.join(",") + "\n"
+        })
+        .collect();
+    let profile = profiles(&body(Kind::Markers(4), "link_6"))[0]
+        .replace("use: static}", "use: static, hold: {joint_1_deg: 20.125}}");
+    let (proposal, done) = edit(&known(&profile, &[]), &[file("turn", without)]);
+    assert!(
+        done.text.contains("hold: {joint_1_deg: 20.125}\n"),
+        "{}",
+        done.text
+    );
+    let held = proposal
+        .facts
+        .iter()
+        .find(|f| matches!(f.about, About::HeldAsElsewhere { .. }));
+    assert!(held.is_some_and(|fact| fact.check));
+}
+
+/// A simulation needs a mount for every body: a new body gets an invented one.
+#[test]
+fn bodies_are_added_to_profiles_that_simulate() {
+    let bodies: [On; 2] = [
+        ("hand", "flange", Kind::Markers(4)),
+        ("elbow", "link_3", Kind::Markers(3)),
+    ];
+    let profile = profiles(&body(Kind::Markers(4), "flange"))[0].clone()
+        + "simulate:\n  seed: 1\n  tracker_from_root: {}\n  mounts: {hand: {markers_mm: {hand_1: [0, 0, 0], hand_2: [9, 0, 0], hand_3: [0, 9, 0], hand_4: [0, 0, 9]}}}\n  recordings: {old: {random: {joint_1_deg: [0, 9]}, poses: 9}}\n";
+    let (_, done) = edit(&known(&profile, &[]), &new_files(&bodies, 34));
+    let raw = calib_profile::parse(&done.text, "lab.yaml").expect("a profile");
+    let mounts = &raw.simulate.as_ref().expect("there").mounts;
+    assert_eq!(mounts.len(), 2, "{}", done.text);
+    assert!(
+        done.facts
+            .iter()
+            .any(|fact| fact.about == About::InventedMount)
+    );
+}
+
 #[test]
 fn the_link_of_the_profile_stands_and_what_contradicts_it_is_said() {
     let made = recordings(&[("hand", "link_6", Kind::Markers(4))], Design::Sweeps, 4);
@@ -226,6 +366,12 @@ fn entries_that_cannot_be_read_are_completed_and_files_that_are_not_there_replac
         );
         assert_eq!(raw.recordings["checks"].file, "day1/checks.csv");
         assert!(done.text.contains("# May") && done.text.contains("# end"));
+        assert!(
+            done.text
+                .contains("# CHECK: The file of this recording, `checks.csv`"),
+            "{}",
+            done.text
+        );
         let replaced = fact(&proposal, &Place::Recording("checks".to_owned()), |a| {
             matches!(a, About::Replaced { .. })
         });
