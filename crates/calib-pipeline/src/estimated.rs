@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use calib_finding::Finding;
+use calib_finding::{Finding, catalog};
 use calib_profile::Method;
 
 use crate::error::PipelineError;
@@ -72,7 +72,7 @@ pub fn estimated(
 }
 
 /// Estimates recordings that a robot of the same kind gave in the postures of `like`, and in which nothing is wrong: the checks, the closed forms and the
-/// choice of the noise are those of `like`, and the fit begins where that of `like` ended. `None` where that is not the same estimate, so that
+/// choice of the noise, whether it has a memory among it, are those of `like`, and the fit begins where that of `like` ended. `None` where that is not the same estimate, so that
 /// [`estimated`] must be asked: the noise of `like` is no single statement, or the recordings show other parameters.
 #[must_use]
 pub fn estimated_again(mut inputs: Inputs, like: &Estimated) -> Option<Estimated> {
@@ -82,7 +82,9 @@ pub fn estimated_again(mut inputs: Inputs, like: &Estimated) -> Option<Estimated
         tracks: body_tracks(&inputs, &mut Vec::new()).ok()?,
         start: like.checked.start.clone(),
     };
-    let solved = repeated(&mut inputs, &mut checked, fit)?;
+    let is_memory = |f: &Finding| f.id == catalog::NOISE_HAS_MEMORY;
+    let has_memory = like.checked.findings.iter().any(is_memory);
+    let solved = repeated(&mut inputs, &mut checked, fit, has_memory)?;
     Some(Estimated {
         inputs,
         checked,

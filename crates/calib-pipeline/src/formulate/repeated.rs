@@ -24,8 +24,13 @@ pub fn is_repeatable(fit: &MlFit) -> bool {
     as_stated && fit.widened.is_none()
 }
 
-/// The fit, from where the earlier one ended; `None` where the recordings do not show the same parameters, or the fit cannot be evaluated.
-pub(crate) fn repeated(inputs: &mut Inputs, checked: &mut Checked, like: &MlFit) -> Option<Solved> {
+/// The fit, from where the earlier one ended, with a memory of the noise looked for where that one had it; `None` where the recordings do not show the same parameters, or the fit cannot be evaluated.
+pub(crate) fn repeated(
+    inputs: &mut Inputs,
+    checked: &mut Checked,
+    like: &MlFit,
+    has_memory: bool,
+) -> Option<Solved> {
     let mut settings = Settings::default();
     settings.robust.enabled = inputs.robot.profile.solve.robust;
     let stated = ml::state(inputs, &checked.tracks, &checked.start, FreeSet::Profile);
@@ -34,7 +39,9 @@ pub(crate) fn repeated(inputs: &mut Inputs, checked: &mut Checked, like: &MlFit)
     fit.levels = like.levels.clone();
     priors::by_evidence(&mut fit, inputs, &settings);
     checked.findings.extend(noise::meaning(&mut fit));
-    checked.findings.extend(with_memory(&mut fit));
+    if has_memory {
+        checked.findings.extend(with_memory(&mut fit));
+    }
     clock::correct(inputs, &fit);
     ml_result(inputs, fit, None).ok()
 }
