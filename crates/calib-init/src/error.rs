@@ -184,13 +184,10 @@ pub enum InitError {
         /// The lines.
         lines: Vec<String>,
     },
-    /// A file alone is no recording, and the recordings that were given with it stand in the profile and say how to read theirs.
+    /// A file alone is no recording, and the recordings that were given with it stand in the profile and stay as they are.
     #[error(
-        "{file}: this file alone is no recording, and {} of the profile, which {} given with it, {} already how to read {} files\n  help: complete the entry in the profile by hand (`robot_log: {{file: …}}`), or delete it and repeat the command",
-        listed(.recordings),
-        if .recordings.len() == 1 { "was" } else { "were" },
-        if .recordings.len() == 1 { "says" } else { "say" },
-        if .recordings.len() == 1 { "its" } else { "their" }
+        "{file}: this file alone is no recording; what was given with it is in the profile already and stays as it is: {}\n  help: complete the entry in the profile by hand (`robot_log: {{file: …}}`), or delete it and repeat the command",
+        listed(.recordings)
     )]
     BesideListed {
         /// The file.
@@ -226,7 +223,7 @@ pub enum InitError {
     },
     /// The profile was changed by somebody else while it was edited.
     #[error(
-        "{file}: the file changed while recordings were read; nothing was written\n  help: save it, and repeat the command"
+        "{file}: the file changed while recordings were read; nothing was written\n  help: repeat the command"
     )]
     Changed {
         /// The profile.

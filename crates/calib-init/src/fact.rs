@@ -348,7 +348,7 @@ pub enum About {
         /// What errors of a nominal robot explain, m.
         limit: f64,
     },
-    /// A recording that the edited profile has already, with how to read it.
+    /// A recording that the edited profile has already, and that can be read.
     Listed,
     /// The file of a recording of the edited profile took the place of one that does not exist.
     Replaced {

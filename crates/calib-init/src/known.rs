@@ -290,7 +290,7 @@ impl Known {
 
     /// What recordings are used for: of those of the profile only what contradicts it.
     #[must_use]
-    pub fn of_new(
+    pub fn of_uses(
         &self,
         model: &RobotModel,
         (drafts, tables): (&[Draft], &[Poses]),

@@ -345,7 +345,7 @@ fn with_recordings(
     proposal.noise = noise(&of_bodies);
     if let Some(known) = known {
         of_bodies = known.of_noise(of_bodies);
-        of_uses = known.of_new(model, (&drafts, &poses), of_uses);
+        of_uses = known.of_uses(model, (&drafts, &poses), of_uses);
     }
     proposal
         .facts

@@ -71,9 +71,9 @@ pub fn estimated(
     })
 }
 
-/// Estimates recordings that a robot of the same kind gave in the postures of `like`, and in which nothing is wrong: the checks, the closed forms and the
-/// choice of the noise, whether it has a memory among it, are those of `like`, and the fit begins where that of `like` ended. `None` where that is not the same estimate, so that
-/// [`estimated`] must be asked: the noise of `like` is no single statement, or the recordings show other parameters.
+/// Estimates recordings that a robot of the same kind gave in the postures of `like`, and in which nothing is wrong: the checks, the closed forms, the
+/// choice of the noise and whether it has a memory are those of `like`, and the fit begins where that of `like` ended. `None` where that is not the same
+/// estimate, so that [`estimated`] must be asked: the noise of `like` is no single statement, or the recordings show other parameters.
 #[must_use]
 pub fn estimated_again(mut inputs: Inputs, like: &Estimated) -> Option<Estimated> {
     let fit = like.solved.fit.as_ref().filter(|fit| is_repeatable(fit))?;

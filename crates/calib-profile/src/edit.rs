@@ -91,7 +91,7 @@ pub fn with_entry(
         lines: &lines,
         key: key.line.checked_sub(1)?,
         indent: key.column.checked_sub(1)?,
-        new_line: if text.contains("\r\n") { "\r\n" } else { "\n" },
+        new_line: new_line(text),
     };
     let reads = |text: &String| parse(text, "").is_ok_and(|raw| raw == *expected);
     if at.is_flow(value.line.checked_sub(1)?, value.column.checked_sub(1)?) {
@@ -113,7 +113,7 @@ pub fn with_comments(text: &str, path: &[&str], comments: &[String]) -> Option<S
     let lines: Vec<&str> = text.split_inclusive('\n').collect();
     let at = key.line.checked_sub(1)?;
     let indent = " ".repeat(indent_of(lines.get(at)?));
-    let new_line = if text.contains("\r\n") { "\r\n" } else { "\n" };
+    let new_line = new_line(text);
     let comments = comments.iter().map(|c| format!("{indent}{c}{new_line}"));
     let comments: String = comments.collect();
     let text = format!("{}{comments}{}", lines[..at].concat(), lines[at..].concat());
@@ -156,6 +156,14 @@ struct Section<'t> {
     /// Characters before its key.
     indent: usize,
     new_line: &'static str,
+}
+
+/// What ends the lines of a text.
+fn new_line(text: &str) -> &'static str {
+    match text.contains("\r\n") {
+        true => "\r\n",
+        false => "\n",
+    }
 }
 
 /// Characters before the first that is no space.

@@ -24,8 +24,7 @@ pub(super) fn sentence(about: &About) -> String {
             format!("The profile has it on `{link}`: {fit}.{better}")
         }
         About::Listed => {
-            "The profile has this recording, and says how to read it: its entry stays as it is."
-                .to_owned()
+            "The profile has this recording already: its entry stays as it is.".to_owned()
         }
         About::Replaced { file } => {
             format!(

@@ -24,7 +24,8 @@ pub fn is_repeatable(fit: &MlFit) -> bool {
     as_stated && fit.widened.is_none()
 }
 
-/// The fit, from where the earlier one ended, with a memory of the noise looked for where that one had it; `None` where the recordings do not show the same parameters, or the fit cannot be evaluated.
+/// The fit, from where the earlier one ended, with the memory of its noise looked for where that one had it. `None` where the recordings do not show the
+/// same parameters, or the fit cannot be evaluated.
 pub(crate) fn repeated(
     inputs: &mut Inputs,
     checked: &mut Checked,
