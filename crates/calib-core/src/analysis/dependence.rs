@@ -23,13 +23,15 @@
 //! What this does not see: frames of one pose as separate samples, whose errors are shared but do not fade. Their
 //! joint values are equal; merge them before.
 
+use std::sync::Arc;
+
 use nalgebra::DMatrix;
 use rayon::prelude::*;
 
 use crate::analysis::solution::{Solution, describe_parameters};
 use crate::graph::measurement::MeasurementKind;
 use crate::solve::equations::Workspace;
-use crate::solve::whitened::{Whitened, covariance_of, whitened};
+use crate::solve::whitened::{Whitened, covariance_of};
 
 mod found;
 mod scaled;
@@ -231,7 +233,7 @@ impl Solution {
         let of_some = |some: &[usize]| -> Vec<(usize, Unnumbered)> {
             let mut work = work.clone();
             let rows = some.iter().filter_map(|&sample| {
-                let mut rows = whitened(self.objective(), &self.values, sample, &mut work)?;
+                let mut rows = Arc::unwrap_or_clone(self.rows_of(sample, &mut work)?);
                 beside(sample, &mut rows, &work);
                 Some((sample, scaled_sample(self, &rows, of)))
             });

@@ -6,6 +6,7 @@
 
 use crate::analysis::beginning::{first_levels, mask_of, stated_levels};
 use crate::analysis::information::Information;
+use crate::analysis::kept_rows::KeptRows;
 use crate::analysis::levels_found::levels_found;
 use crate::analysis::looked_at::fewer;
 use crate::analysis::observability::observe;
@@ -494,6 +495,7 @@ pub(super) fn finish(model: Model, minimum: Minimum, outcome: Outcome) -> Result
         weights,
         rejected,
         theta,
+        kept_rows: KeptRows::default(),
         model,
     })
 }

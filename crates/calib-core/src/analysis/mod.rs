@@ -13,6 +13,7 @@ pub(crate) mod gauge;
 pub(crate) mod gear_ratio;
 pub(crate) mod goodness;
 pub(crate) mod information;
+mod kept_rows;
 mod less_noise;
 mod levels_found;
 mod likelier;

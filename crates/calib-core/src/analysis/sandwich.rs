@@ -19,6 +19,7 @@
 //! ```
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
@@ -28,7 +29,7 @@ use crate::model::values::Values;
 use crate::solve::chunks::{chunked, is_one_chunk};
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::normal::accumulate;
-use crate::solve::whitened::{covariance_of, whitened};
+use crate::solve::whitened::{Whitened, covariance_of, whitened};
 
 /// An eigenvalue of I − Q below this means a direction with leverage 1, which carries no residual.
 const LEVERAGE_LEFT: f64 = 1e-10;
@@ -41,7 +42,7 @@ impl Solution {
     pub fn cluster_robust_sigmas(&self) -> Option<Vec<Option<f64>>> {
         let c = covariance_of(&self.information.curvature(&self.model))?;
         let samples: Vec<(usize, f64)> = self.looked_at().weighed().collect();
-        let covariance = &c * middle(self.objective(), &self.values, &c, &samples) * &c;
+        let covariance = &c * self.middle(&c, &samples) * &c;
         let sigma = |column: usize| covariance[(column, column)].max(0.0).sqrt();
         let columns = self.model.column_of.iter();
         Some(columns.map(|column| column.map(sigma)).collect())
@@ -53,32 +54,37 @@ impl Solution {
     #[must_use]
     pub fn with_cluster_covariance(&self) -> Option<Self> {
         let c = covariance_of(&self.information.curvature(&self.model))?;
-        let middle = middle(self.objective(), &self.values, &c, &every(&self.model));
+        let middle = self.middle(&c, &every(&self.model));
         Some(self.at_least(middle))
+    }
+
+    /// What stands between the two C of equation (1).
+    fn middle(&self, c: &DMatrix<f64>, samples: &[(usize, f64)]) -> DMatrix<f64> {
+        let rows = |sample: usize, work: &mut Workspace| self.rows_of(sample, work);
+        middle(&self.model, &self.values, &rows, c, samples)
     }
 
     /// The same solution with the covariance that this estimate has under another statement of the noise, in every direction in
     /// which it is larger: equation (3). Of long recordings it looks at some thousand samples that stand for all. `None` when the model
     /// cannot be evaluated.
     pub(crate) fn with_noise_of(&self, other: &Model, theta: &[f64]) -> Option<Self> {
-        let (own, weights) = (self.objective(), &self.weights);
         let other = Objective {
             model: other,
-            weights,
+            weights: &self.weights,
             theta,
         };
         let n = self.model.free();
         let mut middle = DMatrix::zeros(n, n);
         add_priors(&self.model, &mut middle);
-        let (mut work, mut of_other) = (Workspace::new(own.model), Workspace::new(other.model));
-        work.cache.update(&own.model.problem, &self.values);
+        let (mut work, mut of_other) = (Workspace::new(&self.model), Workspace::new(other.model));
+        work.cache.update(&self.model.problem, &self.values);
         of_other.cache.update(&other.model.problem, &self.values);
         for (sample, factor) in self.looked_at().weighed() {
-            let Some(rows) = whitened(own, &self.values, sample, &mut work) else {
+            let Some(rows) = self.rows_of(sample, &mut work) else {
                 continue;
             };
             let noise = whitened(other, &self.values, sample, &mut of_other)?;
-            let scores = rows.a.transposed_times(&(rows.l_inverse * noise.l));
+            let scores = rows.a.transposed_times(&(&rows.l_inverse * noise.l));
             middle.gemm(factor, &scores, &scores.transpose(), 1.0);
         }
         Some(self.at_least(middle))
@@ -124,7 +130,10 @@ pub fn sandwich(
         return None;
     }
     let c = covariance_of(&system)?;
-    Some(&c * middle(objective, values, &c, &every(model)) * &c)
+    let rows = |sample: usize, work: &mut Workspace| {
+        whitened(objective, values, sample, work).map(Arc::new)
+    };
+    Some(&c * middle(model, values, &rows, &c, &every(model)) * &c)
 }
 
 /// Every sample, standing for itself.
@@ -134,12 +143,12 @@ fn every(model: &Model) -> Vec<(usize, f64)> {
 
 /// What stands between the two C of equation (1), from samples that stand for so many each.
 fn middle(
-    objective: Objective,
+    model: &Model,
     values: &Values,
+    rows: &(dyn Fn(usize, &mut Workspace) -> Option<Arc<Whitened>> + Sync),
     c: &DMatrix<f64>,
     samples: &[(usize, f64)],
 ) -> DMatrix<f64> {
-    let model = objective.model;
     let n = model.free();
     let mut work = Workspace::new(model);
     work.cache.update(&model.problem, values);
@@ -149,7 +158,8 @@ fn middle(
     let add = |some: Range<usize>, sum: &mut DMatrix<f64>| {
         let mut work = Workspace::with(model, cache.clone());
         for &(sample, factor) in &samples[some] {
-            if let Some(score) = adjusted_score(objective, values, sample, c, &mut work) {
+            if let Some(s) = rows(sample, &mut work) {
+                let score = adjusted_score(&s, c);
                 sum.ger(factor, &score, &score, 1.0);
             }
         }
@@ -176,15 +186,8 @@ fn add_priors(model: &Model, middle: &mut DMatrix<f64>) {
     }
 }
 
-/// Aᵀ(I − Q)^(-½) w of a sample; `None` where it has no rows.
-fn adjusted_score(
-    objective: Objective,
-    values: &Values,
-    sample: usize,
-    c: &DMatrix<f64>,
-    work: &mut Workspace,
-) -> Option<DVector<f64>> {
-    let s = whitened(objective, values, sample, work)?;
+/// Aᵀ(I − Q)^(-½) w of a sample.
+fn adjusted_score(s: &Whitened, c: &DMatrix<f64>) -> DVector<f64> {
     let m = s.w.len();
     // I − Q = U diag(λ) Uᵀ
     let taken = s.a.gram_with(c);
@@ -202,5 +205,5 @@ fn adjusted_score(
     let adjusted = &eigen.eigenvectors * coefficients;
     let mut score = DVector::zeros(c.nrows());
     s.a.add_transposed_vector(&adjusted, &mut score);
-    Some(score)
+    score
 }

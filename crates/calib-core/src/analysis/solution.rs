@@ -3,6 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::analysis::information::{INDETERMINATE, Information};
+use crate::analysis::kept_rows::KeptRows;
 use crate::analysis::observability::{Direction, Observability, directions, weak};
 use crate::graph::ids::{GroupId, ParameterId};
 use crate::graph::parameter::ParameterKind;
@@ -126,6 +127,7 @@ pub struct Solution {
     pub rejected: Vec<Rejection>,
     /// σ² per noise group, as used.
     pub theta: Vec<f64>,
+    pub(crate) kept_rows: KeptRows,
 }
 
 impl Solution {

@@ -12,8 +12,8 @@ use nalgebra::DMatrix;
 
 use crate::analysis::solution::Solution;
 use crate::analysis::tails::ResidualVector;
-use crate::solve::equations::{Objective, Workspace};
-use crate::solve::whitened::{Whitened, covariance_of, whitened};
+use crate::solve::equations::Workspace;
+use crate::solve::whitened::{Whitened, covariance_of};
 
 /// A row that the parameters follow by more than this carries no residual.
 const LEVERAGE: f64 = 1.0 - 1e-6;
@@ -37,16 +37,12 @@ impl Solution {
         let mut work = Workspace::new(model);
         work.cache.update(&model.problem, &self.values);
         let everything = vec![1.0; model.observations.len()];
-        let all = Objective {
-            weights: &everything,
-            ..self.objective()
-        };
         let mut out = StandardizedResiduals::default();
         for sample in self.looked_at().samples {
             if model.is_held_out(sample) {
                 continue;
             }
-            let kept = whitened(self.objective(), &self.values, sample, &mut work);
+            let kept = self.rows_of(sample, &mut work);
             if let Some(s) = &kept {
                 let leverages = leverages(s, &c);
                 let rows = s.w.iter().zip(&leverages).filter(|(_, h)| **h < LEVERAGE);
@@ -55,7 +51,7 @@ impl Solution {
             let whole = |s: &Whitened| s.blocks.len() == model.of_sample[sample].len();
             let s = match kept {
                 Some(s) if whole(&s) => Some(s),
-                _ => whitened(all, &self.values, sample, &mut work),
+                _ => self.rows_with(&everything, sample, &mut work),
             };
             out.vectors
                 .extend(s.iter().flat_map(|s| self.vectors(sample, s, &c)));

@@ -230,13 +230,9 @@ impl Solution {
         let mut work = Workspace::new(model);
         work.cache.update(&model.problem, &self.values);
         let everything = vec![1.0; model.observations.len()];
-        let objective = Objective {
-            weights: &everything,
-            ..self.objective()
-        };
         let mut out = Vec::new();
         for sample in 0..model.problem.samples {
-            let Some(s) = whitened(objective, &self.values, sample, &mut work) else {
+            let Some(s) = self.rows_with(&everything, sample, &mut work) else {
                 continue;
             };
             let e = &s.l * &s.w;

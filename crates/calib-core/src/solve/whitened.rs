@@ -67,6 +67,7 @@ fn scaled_root(system: &NormalEquations) -> Option<(InverseRoot, Vec<f64>)> {
 }
 
 /// One sample in whitened form, V = LLᵀ: A = L⁻¹J (m × n), w (m), L⁻¹ (m × m).
+#[derive(Debug, Clone)]
 pub(crate) struct Whitened {
     pub a: Parted,
     pub w: DVector<f64>,

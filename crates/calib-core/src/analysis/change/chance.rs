@@ -104,7 +104,7 @@ struct Noise {
 
 impl Noise {
     fn of(design: &Design, sets: usize, rng: &mut ChaCha8Rng) -> Self {
-        let rows = design.kept.iter().map(|kept| kept.a.nrows());
+        let rows = design.kept.iter().map(|kept| kept.rows.a.nrows());
         let mut samples: Vec<_> = rows.map(|rows| DMatrix::zeros(rows, sets)).collect();
         let mut priors = DMatrix::zeros(design.priors.len(), sets);
         for set in 0..sets {
@@ -138,7 +138,7 @@ fn largest(
             // e = L₀ z, as this level whitens it.
             let pairs = own.kept.iter().zip(&design.kept).zip(z);
             let z: Vec<DMatrix<f64>> = pairs
-                .map(|((own, kept), z)| &kept.l_inverse * (&own.l * z))
+                .map(|((own, kept), z)| &kept.rows.l_inverse * (&own.rows.l * z))
                 .collect();
             drawn(design, shifts, &z, priors)
         }
@@ -188,7 +188,7 @@ fn drawn(
         columns.for_each(|(cost, z)| *cost += z.norm_squared());
     };
     for (place, (kept, z)) in design.kept.iter().zip(z).enumerate() {
-        kept.a.add_transposed_times(1.0, z, &mut g);
+        kept.rows.a.add_transposed_times(1.0, z, &mut g);
         let own = &kept.b * z;
         for (pattern, sums) in &mut drifts {
             let factor = pattern.factor(place, count);

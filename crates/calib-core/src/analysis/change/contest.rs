@@ -224,7 +224,7 @@ impl Solution {
         work.cache.update(&model.problem, &self.values);
         let samples = self.looked_at().samples;
         for seen in self.seen(effects, &samples) {
-            let (s, at) = (&seen.rows, (seen.sample, &seen.rows, &seen.columns));
+            let (s, at) = (&seen.rows, (seen.sample, &*seen.rows, &seen.columns));
             let b = self.columns_at(changes, columns, &ranges, at, &work);
             s.a.add_gram(1.0, &mut h);
             s.a.add_transposed_vector(&s.w, &mut g);

@@ -17,6 +17,8 @@
 //! one sample to the next ([`Dependence`](crate::Dependence)), which fewer samples
 //! show. What asks for the larger T decides.
 
+use std::sync::Arc;
+
 use calib_geometry::decompose::symmetric_eigen;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
@@ -29,7 +31,7 @@ use crate::analysis::dependence::Dependence;
 use crate::analysis::solution::Solution;
 use crate::analysis::successive::is_shown;
 use crate::solve::equations::Workspace;
-use crate::solve::whitened::{Whitened, whitened};
+use crate::solve::whitened::Whitened;
 
 /// Counts of blocks that the samples are cut into. More blocks show their variance better, fewer a longer memory.
 const BLOCKS: [usize; 3] = [48, 24, 12];
@@ -194,8 +196,8 @@ impl<'a> Left<'a> {
             let mut work = work.clone();
             let mut out: Vec<(usize, DVector<f64>, f64, usize)> = Vec::with_capacity(some.len());
             for &sample in some {
-                let (objective, values) = (solution.objective(), &solution.values);
-                if let Some(mut rows) = whitened(objective, values, sample, &mut work) {
+                if let Some(rows) = solution.rows_of(sample, &mut work) {
+                    let mut rows = Arc::unwrap_or_clone(rows);
                     let b = self.beside_change(sample, &mut rows, &work);
                     let bin = edges.partition_point(|edge| *edge <= sample) - 1;
                     out.push((bin, b.tr_mul(&rows.w), rows.w.norm_squared(), rows.w.len()));

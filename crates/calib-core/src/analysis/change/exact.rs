@@ -156,6 +156,7 @@ impl Solution {
         (what, back): (Moved, &Isometry3<f64>),
         inside: &dyn Fn(usize) -> bool,
     ) {
+        corrected.forget_rows();
         let model = &self.model;
         let mut work = Workspace::new(model);
         work.cache.update(&model.problem, &self.values);
@@ -206,6 +207,7 @@ impl Solution {
 }
 
 fn shift_readings(of: &mut Solution, edge: EdgeId, by: f64, inside: &dyn Fn(usize) -> bool) {
+    of.forget_rows();
     let problem = &mut of.model.problem;
     if let EdgeKind::Joint(joint) = &mut problem.edges[edge.index()].kind {
         let readings = joint.q.iter_mut().enumerate();

@@ -15,6 +15,7 @@
 //! them.
 
 use std::ops::Range;
+use std::sync::Arc;
 
 use nalgebra::{Cholesky, DMatrix, DVector};
 use rayon::prelude::*;
@@ -30,8 +31,7 @@ use crate::graph::edge::EdgeKind;
 use crate::graph::ids::EdgeId;
 use crate::solve::equations::{NormalEquations, Workspace};
 use crate::solve::normal::add_prior;
-use crate::solve::parted::Parted;
-use crate::solve::whitened::{root_of, whitened};
+use crate::solve::whitened::{Whitened, root_of};
 
 mod draws;
 
@@ -106,7 +106,7 @@ impl Left {
 
 /// One sample in whitened form.
 struct Sample {
-    a: Parted,
+    rows: Arc<Whitened>,
     /// Columns G̃ of the joints, in the order of [`Level::joints`], and ÃᵀG̃.
     joints: DMatrix<f64>,
     a_joints: DMatrix<f64>,
@@ -351,15 +351,14 @@ impl Level {
         let mut work = Workspace::new(model);
         work.cache.update(&model.problem, &solution.values);
         for sample in looked_at(&used, borders, SAMPLES).samples {
-            let objective = solution.objective();
-            let Some(rows) = whitened(objective, &solution.values, sample, &mut work) else {
+            let Some(rows) = solution.rows_of(sample, &mut work) else {
                 continue;
             };
             let all = candidates.whitened(solution, sample, &rows, &work);
             let own_rows =
                 solution.effect_rows(&effects, sample, &rows.blocks, rows.w.len(), &work);
             let tested = &rows.l_inverse * own_rows;
-            let at = (sample, &rows, &tested);
+            let at = (sample, &*rows, &tested);
             let b = solution.columns_at(&candidates, &columns, &out.ranges, at, &work);
             rows.a.add_gram(1.0, &mut h);
             rows.a.add_transposed_vector(&rows.w, &mut g);
@@ -369,11 +368,11 @@ impl Level {
             out.freedom += rows.w.len() as f64;
             out.log_det += rows.log_det;
             out.numbers.push(sample);
-            out.residuals.push(rows.w);
+            out.residuals.push(rows.w.clone());
             let joints = all.select_columns(&places);
             out.samples.push(Sample {
                 a_joints: rows.a.transposed_times(&joints),
-                a: rows.a,
+                rows,
                 joints,
                 suspects: b,
             });
@@ -388,7 +387,7 @@ impl Level {
         let step = -(root * (&out.root * &gradient));
         out.cost += system.prior + gradient.dot(&step);
         for (w, sample) in out.residuals.iter_mut().zip(&out.samples) {
-            *w += sample.a.times_vector(&step);
+            *w += sample.rows.a.times_vector(&step);
             out.u.gemv_tr(1.0, &sample.suspects, w, 1.0);
         }
         out.along = &out.root * &e;

@@ -1,11 +1,13 @@
 //! Cumulative sums of equation (1) over the samples, and the best set of samples of a candidate.
 
+use std::sync::Arc;
+
 use calib_geometry::decompose::{dot, inverse_root};
 use nalgebra::{DMatrix, DVector};
 
 use super::columns::{Candidates, Pattern};
 use crate::analysis::solution::Solution;
-use crate::solve::parted::Parted;
+use crate::solve::whitened::Whitened;
 
 mod filled;
 mod others;
@@ -41,12 +43,9 @@ pub(super) struct Found {
 
 /// One sample, kept for the simulation.
 pub(super) struct Kept {
-    pub a: Parted,
+    pub rows: Arc<Whitened>,
     /// B̃ᵀ.
     pub b: DMatrix<f64>,
-    /// L and L⁻¹.
-    pub l: DMatrix<f64>,
-    pub l_inverse: DMatrix<f64>,
 }
 
 /// Rᵀ E, C = R Rᵀ, and Σ B̃ᵀB̃ of one candidate over a set of samples.

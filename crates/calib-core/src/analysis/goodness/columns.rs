@@ -1,5 +1,7 @@
 //! The columns of effects that the model does not have, sample by sample.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, Vector3, Vector6};
 use rayon::prelude::*;
 
@@ -10,7 +12,7 @@ use crate::model::path::DRIVEN;
 use crate::model::pose::Pose;
 use crate::solve::equations::Workspace;
 use crate::solve::rows::{dot, residual};
-use crate::solve::whitened::{Whitened, whitened};
+use crate::solve::whitened::Whitened;
 
 /// Samples that are looked at one after the other, and those that are held at once.
 const TOGETHER: usize = 8;
@@ -20,7 +22,7 @@ const AT_ONCE: usize = 4 * TOGETHER;
 pub(crate) struct Seen {
     /// Its number.
     pub sample: usize,
-    pub rows: Whitened,
+    pub rows: Arc<Whitened>,
     pub columns: DMatrix<f64>,
 }
 
@@ -49,7 +51,7 @@ impl Solution {
         let of = move |work: &Workspace, some: &[usize]| -> Vec<Seen> {
             let mut work = Workspace::with(model, work.cache.clone());
             let seen = some.iter().filter_map(|&sample| {
-                let rows = whitened(self.objective(), &self.values, sample, &mut work)?;
+                let rows = self.rows_of(sample, &mut work)?;
                 let own = self.effect_rows(candidates, sample, &rows.blocks, rows.w.len(), &work);
                 Some(Seen {
                     sample,

@@ -13,7 +13,6 @@
 use crate::analysis::select::NestedError;
 use crate::analysis::solution::{Solution, describe_parameters};
 use crate::solve::equations::Workspace;
-use crate::solve::whitened::whitened;
 
 impl Solution {
     /// The same solution with the covariance of equation (3), and √κ; `None` where the choice cost nothing.
@@ -42,7 +41,7 @@ impl Solution {
         work.cache.update(&model.problem, &self.values);
         let (mut sum, mut count) = (0.0, 0);
         for sample in 0..model.problem.samples {
-            let Some(s) = whitened(self.objective(), &self.values, sample, &mut work) else {
+            let Some(s) = self.rows_of(sample, &mut work) else {
                 continue;
             };
             let j = &s.l * s.a.dense();

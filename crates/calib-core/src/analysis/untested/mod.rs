@@ -32,7 +32,6 @@ use crate::analysis::spread::LinearPoint;
 use crate::graph::edge::EdgeKind;
 use crate::graph::ids::{EdgeId, FrameId};
 use crate::model::path::Step;
-use crate::solve::equations::Objective;
 use crate::solve::whitened::covariance_of;
 use changed::Changed;
 use displacement::{Displacement, add_motion};
@@ -294,14 +293,10 @@ impl Solution {
         let weights: Vec<f64> = observations
             .map(|(o, w)| if held_out(o.sample) { 1.0 } else { *w })
             .collect();
-        let objective = Objective {
-            weights: &weights,
-            ..self.objective()
-        };
         let columns = Columns::new(self, &effects);
         let (design, seen) = rayon::join(
-            || Design::of(&columns, objective, samples, most, &mut changes),
-            || Seen::of(&columns, objective, samples),
+            || Design::of(&columns, &weights, samples, most, &mut changes),
+            || Seen::of(&columns, &weights, samples),
         );
         let common = self.common(&design, &seen, postures)?;
         let of_chunk = |(k, chunk): (usize, &[&UntestedEffect])| {

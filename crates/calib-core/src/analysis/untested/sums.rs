@@ -11,10 +11,10 @@ use crate::analysis::looked_at::looked_at;
 use crate::analysis::solution::Solution;
 use crate::model::cache::State;
 use crate::model::pose::Pose;
-use crate::solve::equations::{NormalEquations, Objective, Workspace};
+use crate::solve::equations::{NormalEquations, Workspace};
 use crate::solve::normal::add_prior;
 use crate::solve::rows::{dot, residual};
-use crate::solve::whitened::{Whitened, whitened};
+use crate::solve::whitened::Whitened;
 
 /// Samples that are summed by one task.
 const CHUNK: usize = 64;
@@ -108,7 +108,7 @@ impl Design {
     /// From at most about `most` of the samples, each of which stands for others of its recording.
     pub(super) fn of(
         columns: &Columns<'_>,
-        objective: Objective,
+        weights: &[f64],
         samples: &[usize],
         most: usize,
         changes: &mut [Option<Changed<'_>>],
@@ -128,7 +128,7 @@ impl Design {
         let mut work = columns.workspace();
         for (sample, factor) in drawn.weighed() {
             let place = places[in_order.partition_point(|s| *s < sample)].1;
-            let Some(s) = whitened(objective, &solution.values, sample, &mut work) else {
+            let Some(s) = solution.rows_with(weights, sample, &mut work) else {
                 continue;
             };
             let h = match solution.model.is_held_out(sample) {
@@ -190,7 +190,7 @@ pub(super) struct Seen {
 }
 
 impl Seen {
-    pub(super) fn of(columns: &Columns<'_>, objective: Objective, samples: &[usize]) -> Self {
+    pub(super) fn of(columns: &Columns<'_>, weights: &[f64], samples: &[usize]) -> Self {
         let solution = columns.solution;
         let none = || Self {
             g: DVector::zeros(solution.model.free()),
@@ -201,7 +201,7 @@ impl Seen {
         let of = |places: &[(usize, usize)]| {
             let (mut sum, mut work) = (none(), at.clone());
             for &(place, sample) in places {
-                if let Some(s) = whitened(objective, &solution.values, sample, &mut work) {
+                if let Some(s) = solution.rows_with(weights, sample, &mut work) {
                     s.a.add_transposed_vector(&s.w, &mut sum.g);
                     let along = columns.at(sample, &s, &work).tr_mul(&s.w);
                     for (k, effect) in columns.effects.iter().enumerate() {

@@ -8,7 +8,7 @@ use crate::analysis::change::columns::{Candidates, Pattern};
 use crate::analysis::solution::Solution;
 use crate::solve::equations::{NormalEquations, Workspace};
 use crate::solve::normal::add_prior;
-use crate::solve::whitened::{Whitened, root_of, whitened};
+use crate::solve::whitened::root_of;
 
 /// Samples that are looked at one after the other, and those whose products are held at once: the same bits for any number of cores.
 const TOGETHER: usize = 16;
@@ -109,8 +109,7 @@ impl Design {
             seen: Vec::with_capacity(samples.len()),
         };
         for (place, &sample) in (first..).zip(samples) {
-            let Some(rows) = whitened(solution.objective(), &solution.values, sample, &mut work)
-            else {
+            let Some(rows) = solution.rows_of(sample, &mut work) else {
                 continue;
             };
             let b = candidates.whitened(solution, sample, &rows, &work);
@@ -122,27 +121,17 @@ impl Design {
             });
             let bb = own.collect();
             let (ab, bw) = (rows.a.transposed_times(&b), b.tr_mul(&rows.w));
-            let Whitened {
-                a,
-                w,
-                l,
-                l_inverse,
-                log_det,
-                ..
-            } = rows;
             out.seen.push(Seen {
                 place,
                 ab,
                 bw,
                 bb,
-                cost: w.norm_squared(),
-                rows: w.len() as f64,
-                log_det,
+                cost: rows.w.norm_squared(),
+                rows: rows.w.len() as f64,
+                log_det: rows.log_det,
                 kept: keep.then(|| Kept {
-                    a,
                     b: b.transpose(),
-                    l,
-                    l_inverse,
+                    rows,
                 }),
             });
         }
