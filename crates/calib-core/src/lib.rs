@@ -141,7 +141,7 @@ pub use analysis::admit::Admission;
 pub use analysis::bounds::Unbounded;
 pub use analysis::change::contest::{Contest, Suspect};
 pub use analysis::change::{
-    BesideScatter, Change, ChangeScan, ChangeSettings, Left, Moved, Scatter,
+    BesideScatter, ChanceOfChanges, Change, ChangeScan, ChangeSettings, Left, Moved, Scatter,
 };
 pub use analysis::closure::{ClosureStatistics, Spread};
 pub use analysis::compare::{Criterion, RankedVariant, compare, compare_with};

@@ -119,7 +119,7 @@ fn single_rows(
         return Ok(());
     }
     let rows = beside(inputs, (tracks, findings), &fit, &settings).map_or(bad, |beside| beside.bad);
-    let causes = causes(inputs, &fit, findings);
+    let causes = causes(inputs, &fit, findings, None);
     causes.leave_unexplained(findings);
     findings.extend(rows.findings);
     // `calib run` decides what it does to the result.

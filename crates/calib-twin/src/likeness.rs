@@ -14,6 +14,7 @@
 
 use std::collections::BTreeMap;
 
+use calib_core::ChanceOfChanges;
 use calib_geometry::statistics::median;
 use calib_pipeline::estimated::Estimated;
 use calib_pipeline::formulate::formulation::MlFit;
@@ -60,11 +61,11 @@ pub struct Likeness(pub BTreeMap<Mark, f64>);
 const FLOOR: f64 = 1e-12;
 
 impl Likeness {
-    /// Of one calibration, with what it says of its residuals; `None`: it has no fit.
+    /// Of one calibration, with what it says of its residuals, where the chance of changes is `known` by that; `None`: it has no fit.
     #[must_use]
-    pub fn of_estimated(of: &Estimated) -> Option<Self> {
+    pub fn of_estimated(of: &Estimated, known: Option<&ChanceOfChanges>) -> Option<Self> {
         let fit = of.solved.fit.as_ref()?;
-        let causes = causes(&of.inputs, fit, &of.checked.findings);
+        let causes = causes(&of.inputs, fit, &of.checked.findings, known);
         Some(Self::of(of, fit, &causes))
     }
 

@@ -1,5 +1,6 @@
 //! A session: postures, gaps, noise and freed parameters, from recordings that exist or would exist.
 
+use calib_core::ChanceOfChanges;
 use calib_pipeline::PipelineError;
 use calib_pipeline::estimated::{Estimated, estimated, estimated_again};
 use calib_pipeline::formulate::formulation::MlFit;
@@ -7,6 +8,7 @@ use calib_pipeline::formulate::ml::calibration_at;
 use calib_pipeline::prepare::inputs::Inputs;
 use calib_pipeline::run::RunOptions;
 use calib_pipeline::verify::causes::{Causes, causes};
+use calib_pipeline::verify::changes;
 use calib_pipeline::verify::residuals::left_out;
 use calib_profile::{BodyKind, Method, Usage};
 use rand::SeedableRng;
@@ -33,6 +35,8 @@ pub struct Session {
     pub likeness: Likeness,
     /// What it promises: σ of each quantity; errors are 0.
     pub promised: Vec<Off>,
+    /// The chance of changes in recordings as these, for all trials that are fitted as these were.
+    pub chance: Option<ChanceOfChanges>,
     /// Recordings with the gaps of the session; what the fit rejected is a gap.
     pub rows: Inputs,
     /// The noise that was found.
@@ -76,7 +80,7 @@ impl Session {
             let file = own.inputs.robot.file.clone();
             return Err(TwinError::NoLikelihood { file });
         };
-        let causes = causes(&own.inputs, fit, &own.checked.findings);
+        let causes = causes(&own.inputs, fit, &own.checked.findings, None);
         let places = places(&own.inputs);
         let truth = Truth::of(&own, fit, fit.calibration.clone(), &fit.solution.values);
         let promised = errors(&own, fit, &truth, &places);
@@ -86,12 +90,15 @@ impl Session {
         let rows = rows(&own.inputs, fit, &mut notes);
         // As the trials are fitted, so that both differ by what is recorded alone.
         let again = estimated_again(rows.clone(), &own);
-        let likeness = again.as_ref().and_then(Likeness::of_estimated);
+        let chance = changes::chance(fit);
+        let of_estimated = |of| Likeness::of_estimated(of, chance.as_ref());
+        let likeness = again.as_ref().and_then(of_estimated);
         Ok(Self {
             likeness: likeness.unwrap_or_else(|| Likeness::of(&own, fit, &causes)),
             noise: noise.unwrap_or_else(|| Noise::found(fit, &own.inputs.robot.model)),
             promised,
             causes,
+            chance,
             rows,
             places,
             about,

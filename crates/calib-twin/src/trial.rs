@@ -95,7 +95,7 @@ impl Session {
         let likeness = again
             .as_ref()
             .filter(|_| whole)
-            .and_then(Likeness::of_estimated);
+            .and_then(|of| Likeness::of_estimated(of, self.chance.as_ref()));
         let again = again.filter(|_| !whole);
         let mut trial = Trial {
             number,
@@ -111,7 +111,8 @@ impl Session {
             }
         };
         if let Some(fit) = &of.solved.fit {
-            let causes = causes(&of.inputs, fit, &of.checked.findings);
+            let known = self.chance.as_ref().filter(|_| !whole);
+            let causes = causes(&of.inputs, fit, &of.checked.findings, known);
             trial.done = Some(Done {
                 converged: fit.solution.status.is_converged(),
                 off: errors(&of, fit, &truth, &self.places),
@@ -143,12 +144,13 @@ impl Session {
         let again = matches!(fault, Fault::Slip { .. })
             .then(|| estimated_again(recordings.clone(), &self.own))
             .flatten();
+        let known = again.as_ref().and(self.chance.as_ref());
         let of = again.map_or_else(|| self.calibrate(recordings), Ok);
         let (named, noticed) = match of {
             // What stops a run is noticed, and not by its name.
             Err(_) => (false, true),
             Ok(of) => of.solved.fit.as_ref().map_or((false, true), |fit| {
-                let causes = causes(&of.inputs, fit, &of.checked.findings);
+                let causes = causes(&of.inputs, fit, &of.checked.findings, known);
                 let named = is_named(fault, what, fit, &causes);
                 (named, named || is_alarm(&of, &causes))
             }),

@@ -1,7 +1,9 @@
 //! What made the residuals: missing effects, a change while recording, or what was suspected before the fit. Each is stated only
 //! where it explains something beside the others.
 
-use calib_core::{Change, ChangeScan, Contest, GoodnessOfFit, Moved, ScoreTest, Suspect};
+use calib_core::{
+    ChanceOfChanges, Change, ChangeScan, Contest, GoodnessOfFit, Moved, ScoreTest, Suspect,
+};
 use calib_finding::Finding;
 
 use super::elimination::{Asked, Held, eliminated};
@@ -78,10 +80,18 @@ impl Cause<'_> {
     }
 }
 
-/// The causes that the data show; `before`: findings from before the fit.
+/// The causes that the data show; `before`: findings from before the fit; `known`: as for [`changes::scan`].
 #[must_use]
-pub fn causes(inputs: &Inputs, fit: &MlFit, before: &[Finding]) -> Causes {
-    let (scan, goodness) = rayon::join(|| changes::scan(fit), || fit.solution.goodness_of_fit());
+pub fn causes(
+    inputs: &Inputs,
+    fit: &MlFit,
+    before: &[Finding],
+    known: Option<&ChanceOfChanges>,
+) -> Causes {
+    let (scan, goodness) = rayon::join(
+        || changes::scan(fit, known),
+        || fit.solution.goodness_of_fit(),
+    );
     let beside = beside_scatter(inputs, fit, before, goodness);
     let open: Vec<Finding> = before
         .iter()

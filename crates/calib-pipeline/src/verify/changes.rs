@@ -2,7 +2,9 @@
 
 use std::collections::BTreeSet;
 
-use calib_core::{Change, ChangeScan, ChangeSettings, GoodnessOfFit, Moved, Scatter};
+use calib_core::{
+    ChanceOfChanges, Change, ChangeScan, ChangeSettings, GoodnessOfFit, Moved, Scatter,
+};
 use calib_core::{EdgeId, FrameId};
 use calib_finding::{About, Fact, Finding, Severity, Subject, catalog};
 use calib_profile::Usage;
@@ -17,12 +19,24 @@ const CERTAIN: f64 = 2.0;
 /// An angle below it is rounding, rad.
 const ROUNDING: f64 = 1e-9;
 
-/// The scan of the fitted recordings.
+/// The scan of the fitted recordings; `known`: the chance of changes, where that of recordings in the same postures is known.
 #[must_use]
-pub fn scan(fit: &MlFit) -> Option<ChangeScan> {
+pub fn scan(fit: &MlFit, known: Option<&ChanceOfChanges>) -> Option<ChangeScan> {
+    let mut settings = settings(fit);
+    settings.known = known.cloned();
+    fit.solution.changes(&settings)
+}
+
+/// The chance of changes in recordings as those of a fit.
+#[must_use]
+pub fn chance(fit: &MlFit) -> Option<ChanceOfChanges> {
+    fit.solution.chance_of_changes(&settings(fit))
+}
+
+fn settings(fit: &MlFit) -> ChangeSettings {
     let mut settings = ChangeSettings::default();
     settings.borders = fit.formulation.borders();
-    fit.solution.changes(&settings)
+    settings
 }
 
 /// What a change is to be told beside.

@@ -72,7 +72,7 @@ pub fn verified(
     let (causes, mut verified) = rayon::join(
         || {
             fit.map_or_else(Causes::default, |fit| {
-                causes(inputs, fit, &checked.findings)
+                causes(inputs, fit, &checked.findings, None)
             })
         },
         || Verified {

@@ -23,22 +23,22 @@ const OF_PRIORS: f64 = 0.4;
 /// Data sets that are simulated with the same products.
 const TOGETHER: usize = 10;
 
-/// Distribution of the largest T under the model.
-#[derive(Clone)]
-pub(super) struct Chance {
+/// Distribution of the largest T under the model. It is that of all data from the same postures, markers and noise.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ChanceOfChanges {
     /// By candidate: T that its best range exceeds in a tenth of the draws.
-    pub quantiles: Vec<f64>,
+    pub(super) quantiles: Vec<f64>,
     /// Excess over the quantiles that all candidates together exceed with the stated chance.
-    pub threshold: f64,
+    pub(super) threshold: f64,
 }
 
-impl Chance {
+impl ChanceOfChanges {
     /// `seen`: T of every candidate. Where the first draws already show that chance explains them, no more are drawn:
-    /// the threshold is then a rough one.
+    /// the threshold is then a rough one. Without, all are drawn.
     pub(super) fn simulate(
         levels: &Levels,
         tests: &Tests,
-        seen: &[f64],
+        seen: Option<&[f64]>,
         settings: &ChangeSettings,
     ) -> Self {
         /// Draws that decide on more.
@@ -65,10 +65,13 @@ impl Chance {
             }
         };
         draw(&mut draws, FIRST.min(all));
-        let quantiles = quantiles(&draws, count);
-        let of_data = excess(seen, &quantiles);
-        let above = draws.iter().filter(|d| excess(d, &quantiles) > of_data);
-        if above.count() < ABOVE {
+        let explain = |seen: &[f64]| {
+            let quantiles = quantiles(&draws, count);
+            let of_data = excess(seen, &quantiles);
+            let above = draws.iter().filter(|d| excess(d, &quantiles) > of_data);
+            above.count() >= ABOVE
+        };
+        if !seen.is_some_and(explain) {
             draw(&mut draws, all);
         }
         Self::of(&draws, count, settings.level)

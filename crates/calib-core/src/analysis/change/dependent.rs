@@ -23,7 +23,7 @@ use calib_geometry::decompose::symmetric_eigen;
 use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
-use super::chance::Chance;
+use super::chance::ChanceOfChanges;
 use super::columns::Pattern;
 use super::exact::Scanned;
 use super::sums::Found;
@@ -64,7 +64,11 @@ impl Solution {
 
     /// The variance of sums over blocks of samples beside a change, over what it is without memory, and its degrees of freedom: m and ν of equation (3), where
     /// they show more than chance.
-    pub(super) fn memory_in_blocks(&self, seen: &Seen<'_>, chance: &Chance) -> Vec<(f64, f64)> {
+    pub(super) fn memory_in_blocks(
+        &self,
+        seen: &Seen<'_>,
+        chance: &ChanceOfChanges,
+    ) -> Vec<(f64, f64)> {
         Left::of(self, seen).of_blocks(chance.quantiles[seen.candidate])
     }
 }

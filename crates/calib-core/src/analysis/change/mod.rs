@@ -38,11 +38,11 @@ use serde::{Deserialize, Serialize};
 
 use crate::analysis::solution::Solution;
 use crate::graph::ids::{EdgeId, FrameId};
-use chance::Chance;
+pub use chance::ChanceOfChanges;
 use columns::Candidates;
 use dependent::{Seen, in_blocks};
 use exact::{Scanned, turned};
-use levels::{Best, Levels};
+use levels::{Best, Levels, Tests};
 pub use scatter::{BesideScatter, Left, Scatter};
 use sums::{Design, LEAST, SIMULATED};
 
@@ -80,6 +80,8 @@ pub struct ChangeSettings {
     pub level: f64,
     /// Seed of the simulation.
     pub seed: u64,
+    /// What a simulation gave for the same postures, markers and noise, in place of one of its own; not looked at where what may have moved differs.
+    pub known: Option<ChanceOfChanges>,
 }
 
 impl Default for ChangeSettings {
@@ -92,6 +94,7 @@ impl Default for ChangeSettings {
             // kinds together are to stay below 1 %.
             level: 0.001,
             seed: 1,
+            known: None,
         }
     }
 }
@@ -231,7 +234,7 @@ impl Solution {
         changes: &mut [(usize, Change)],
         found: &[Option<Best>],
         coarse: &Scanned<'_>,
-        chance: &Chance,
+        chance: &ChanceOfChanges,
     ) {
         /// What explains less than this part of what the best one does to first order is not the cause.
         const PART: f64 = 0.25;
@@ -271,7 +274,7 @@ impl Solution {
         changes: &mut [(usize, Change)],
         found: &[Option<Best>],
         scanned: &Scanned<'_>,
-        chance: &mut Chance,
+        chance: &mut ChanceOfChanges,
     ) -> BTreeMap<usize, f64> {
         let without = chance.clone();
         let mut memory = BTreeMap::new();
@@ -313,6 +316,39 @@ impl Solution {
         memory
     }
 
+    /// The chance of changes in data such as those of the fit, from all draws: for scans of other data from the same postures, markers and noise.
+    /// `None` as for [`changes`](Self::changes).
+    #[must_use]
+    pub fn chance_of_changes(&self, settings: &ChangeSettings) -> Option<ChanceOfChanges> {
+        let candidates = Candidates::new(self);
+        let used = self.looked_at().samples;
+        if !self.is_testable() || used.len() < 2 * LEAST || candidates.list.is_empty() {
+            return None;
+        }
+        let edges = every(&used, used.len().div_ceil(EDGES));
+        let levels = Levels::new(self, &candidates, &used, &edges, &settings.borders)?;
+        self.chance_by(&candidates, (&levels, &levels.tests()), None, settings)
+    }
+
+    /// Draws from what was scanned, or with many samples from fewer of them.
+    fn chance_by(
+        &self,
+        candidates: &Candidates,
+        (levels, tests): (&Levels, &Tests),
+        seen: Option<&[f64]>,
+        settings: &ChangeSettings,
+    ) -> Option<ChanceOfChanges> {
+        let (used, borders) = (self.looked_at().samples, &settings.borders);
+        let thin = thinned(&used, borders);
+        // With few samples the scan itself is small enough to be simulated.
+        if thin.len() == used.len() {
+            return Some(ChanceOfChanges::simulate(levels, tests, seen, settings));
+        }
+        let fewer = Levels::of(Design::new(self, candidates, &thin, &thin, borders)?);
+        let tests = fewer.tests();
+        Some(ChanceOfChanges::simulate(&fewer, &tests, seen, settings))
+    }
+
     fn scan(&self, settings: &ChangeSettings) -> Option<ChangeScan> {
         let candidates = Candidates::new(self);
         let borders = &settings.borders;
@@ -320,7 +356,6 @@ impl Solution {
         if used.len() < 2 * LEAST || candidates.list.is_empty() {
             return None;
         }
-        let thin = thinned(&used, borders);
         let stride = used.len().div_ceil(EDGES);
         let edges = every(&used, stride);
         let levels = Levels::new(self, &candidates, &used, &edges, borders)?;
@@ -331,16 +366,10 @@ impl Solution {
             .iter()
             .map(|f| f.as_ref().map_or(0.0, |f| f.score))
             .collect();
-        // With few samples the scan itself is small enough to be simulated.
-        let fewer = (thin.len() < used.len())
-            .then(|| Design::new(self, &candidates, &thin, &thin, borders));
-        let mut chance = match fewer {
-            Some(simulated) => {
-                let simulated = Levels::of(simulated?);
-                Chance::simulate(&simulated, &simulated.tests(), &seen, settings)
-            }
-            None => Chance::simulate(&levels, &tests, &seen, settings),
-        };
+        let known = settings.known.as_ref();
+        let known = known.filter(|known| known.quantiles.len() == candidates.list.len());
+        let simulate = || self.chance_by(&candidates, (&levels, &tests), Some(&seen), settings);
+        let mut chance = known.cloned().or_else(simulate)?;
         let mut changes: Vec<(usize, Change)> = Vec::new();
         for (k, (candidate, found)) in candidates.list.iter().zip(&found).enumerate() {
             if let Some(found) = found {
