@@ -131,6 +131,8 @@
 //! ```
 
 mod analysis;
+#[cfg(test)]
+mod example;
 mod graph;
 mod model;
 mod solve;

@@ -158,6 +158,22 @@ pub fn nearest_rotation(m: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
     Some(quaternion_of(&r))
 }
 
+/// Roll, pitch and yaw (rad) for a reader, R = Rz(y) Ry(p) Rx(r). Within 1e-7 rad of pitch ±90°, where rounding would divide one turn among roll and
+/// yaw at will, roll is 0: what is read may be off by that.
+#[must_use]
+pub fn rpy_to_read(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
+    /// cos p
+    const LOCKED: f64 = 1e-7;
+    let m = rotation.to_rotation_matrix().into_inner();
+    let cos_pitch = m[(0, 0)].hypot(m[(1, 0)]);
+    let pitch = (-m[(2, 0)]).atan2(cos_pitch);
+    if cos_pitch < LOCKED {
+        return [0.0, pitch, (-m[(0, 1)]).atan2(m[(1, 1)])];
+    }
+    let roll = m[(2, 1)].atan2(m[(2, 2)]);
+    [roll, pitch, m[(1, 0)].atan2(m[(0, 0)])]
+}
+
 /// Quaternion of a rotation matrix by Shepperd's branch on the largest component (no iteration).
 #[must_use]
 pub fn quaternion_of(r: &Rotation3<f64>) -> UnitQuaternion<f64> {
@@ -197,4 +213,50 @@ pub fn quaternion_of(r: &Rotation3<f64>) -> UnitQuaternion<f64> {
         )
     };
     UnitQuaternion::new_normalize(q)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::FRAC_PI_2;
+
+    use super::*;
+
+    fn rotation([roll, pitch, yaw]: [f64; 3]) -> UnitQuaternion<f64> {
+        UnitQuaternion::from_euler_angles(roll, pitch, yaw)
+    }
+
+    #[test]
+    fn angles_to_read_are_those_of_the_rotation() {
+        for rpy in [
+            [0.0; 3],
+            [0.3, -0.7, 2.9],
+            [-3.1, 1.5, -0.2],
+            [1.0, FRAC_PI_2 - 1e-6, 2.0],
+        ] {
+            let read = rpy_to_read(&rotation(rpy));
+            assert!(
+                (0..3).all(|i| (read[i] - rpy[i]).abs() < 1e-9),
+                "{rpy:?} {read:?}"
+            );
+        }
+    }
+
+    /// A turn by less than a tracker sees changes what is read by as much, and no more.
+    #[test]
+    fn angles_to_read_do_not_jump_at_the_lock() {
+        for pitch in [FRAC_PI_2, -FRAC_PI_2] {
+            let exact = rotation([0.0, pitch, 0.4]);
+            let expected = rpy_to_read(&exact);
+            for k in 0..50 {
+                let turn = Vector3::new((1.3 * k as f64).sin(), (2.9 * k as f64).cos(), 0.5);
+                let read = rpy_to_read(&(exact * exp(&(turn * 1e-9))));
+                assert!(
+                    (0..3).all(|i| (read[i] - expected[i]).abs() < 1e-8),
+                    "{read:?}"
+                );
+                let off = rotation(read).angle_to(&exact);
+                assert!(off < 2e-7, "{off}");
+            }
+        }
+    }
 }

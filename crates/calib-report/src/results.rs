@@ -1,4 +1,5 @@
 use crate::Unit;
+use calib_geometry::so3::rpy_to_read;
 use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -50,7 +51,6 @@ impl Transform {
         status: Status,
     ) -> Self {
         let covariance = covariance.filter(|c| c.iter().all(|x| x.is_finite()));
-        let (roll, pitch, yaw) = parent_from_child.rotation.euler_angles();
         let q = parent_from_child.rotation.coords;
         let rotation = parent_from_child.rotation.to_rotation_matrix();
         Self {
@@ -63,7 +63,7 @@ impl Transform {
                 .map(|c| std::array::from_fn(|i| std::array::from_fn(|j| c[(i, j)]))),
             observable: true,
             unobservable: Vec::new(),
-            rpy_rad: [roll, pitch, yaw],
+            rpy_rad: rpy_to_read(&parent_from_child.rotation),
             sigma_translation_m: covariance.map(|c| {
                 // C_parent = R · C_vv · Rᵀ
                 let c_vv: Matrix3<f64> = c.fixed_view::<3, 3>(3, 3).into();

@@ -5,14 +5,11 @@
 //! ```
 
 use crate::analysis::beginning::{first_levels, mask_of, stated_levels};
-use crate::analysis::information::Information;
-use crate::analysis::kept_rows::KeptRows;
-use crate::analysis::levels_found::levels_found;
+use crate::analysis::finish::{Outcome, finish};
 use crate::analysis::looked_at::fewer;
-use crate::analysis::observability::observe;
 use crate::analysis::precision::{FULL, Precision, ROUGH};
 use crate::analysis::settings::Settings;
-use crate::analysis::solution::{Solution, describe_parameters};
+use crate::analysis::solution::Solution;
 use crate::graph::error::Error;
 use crate::graph::problem::Problem;
 use crate::model::layout::{Model, Observation};
@@ -22,9 +19,7 @@ use crate::solve::minimize::{MinimizeSettings, Minimum, SolveStatus, minimize_in
 use crate::solve::noise::{Scoring, score};
 use crate::solve::normal::data_cost;
 use crate::solve::predicted::gate_beside;
-use crate::solve::robust::{
-    RejectReason, Rejection, RobustSettings, clean, clean_near, explain, gate,
-};
+use crate::solve::robust::{Rejection, RobustSettings, clean, clean_near, explain, gate};
 
 /// Gate and refit alternate; the set settles in two or three rounds unless an observation lies at the border, or is kept though the gate rejects it.
 const GATE_ROUNDS: usize = 16;
@@ -227,16 +222,6 @@ pub(super) struct Found {
     pub theta: Vec<f64>,
 }
 
-/// What [`finish`] only passes on.
-pub(super) struct Outcome {
-    pub weights: Vec<f64>,
-    pub theta: Vec<f64>,
-    rejected: Vec<Rejection>,
-    iterations: usize,
-    relative_sigma: Vec<Option<f64>>,
-    chi2_stated: f64,
-}
-
 /// All rounds of a fit together take no more linearizations: ordinary fits take 20 to 80, and one that has not ended by
 /// then has no minimum nearby.
 const MOST_ITERATIONS: usize = 500;
@@ -247,6 +232,8 @@ pub(super) struct Fit<'a> {
     precision: Precision,
     iterations: usize,
     relative_sigma: Vec<Option<f64>>,
+    /// The largest of all minimizations so far.
+    contraction: Option<f64>,
 }
 
 impl<'a> Fit<'a> {
@@ -262,6 +249,7 @@ impl<'a> Fit<'a> {
             precision,
             iterations,
             relative_sigma: vec![None; model.problem.groups.len()],
+            contraction: None,
         }
     }
 
@@ -394,8 +382,12 @@ impl<'a> Fit<'a> {
         decrement: f64,
     ) -> Minimum {
         let own = self.settings.minimize;
+        // What ends a fit is looked at once more.
+        let ends = decrement <= self.last();
+        let contraction = self.contraction.filter(|_| !ends).unwrap_or(1.0);
         let settings = MinimizeSettings {
             decrement,
+            contraction,
             max_iterations: own.max_iterations.min(self.left()),
             ..own
         };
@@ -406,6 +398,9 @@ impl<'a> Fit<'a> {
         };
         let minimum = minimize_in(objective, start, &settings, work);
         self.iterations += minimum.iterations;
+        // None < Some
+        let most = |a: Option<f64>, b: Option<f64>| if a > b { a } else { b };
+        self.contraction = most(self.contraction, minimum.contraction);
         minimum
     }
 
@@ -450,52 +445,4 @@ impl<'a> Fit<'a> {
         }
         self.minimize(&minimum.values, weights, theta, work, self.last())
     }
-}
-
-/// Spectrum, covariance and observability at the minimum.
-pub(super) fn finish(model: Model, minimum: Minimum, outcome: Outcome) -> Result<Solution, Error> {
-    let Outcome {
-        weights,
-        theta,
-        mut rejected,
-        iterations,
-        relative_sigma,
-        chi2_stated,
-    } = outcome;
-    let information =
-        Information::at(&model, &minimum.values, &weights, &theta).ok_or(Error::NotEvaluable)?;
-    let noise = levels_found(&model, &weights, &theta, &relative_sigma);
-    rejected.extend(
-        model
-            .lost()
-            .into_iter()
-            .map(|(measurement, sample, item)| Rejection {
-                sample,
-                measurement,
-                item,
-                reason: RejectReason::Occlusion,
-                distance: 0.0,
-            }),
-    );
-    // ν = rows − tr(C JᵀV⁻¹J)
-    let kept = model.observations.iter().zip(&weights);
-    let rows: usize = kept.filter(|(_, w)| **w > 0.0).map(|(o, _)| o.rows).sum();
-    let degrees_of_freedom = rows as f64 - information.effective_parameters();
-    Ok(Solution {
-        parameters: describe_parameters(&model, &minimum.values, &information),
-        observability: observe(&model, &minimum.values, &information),
-        values: minimum.values,
-        status: minimum.status,
-        iterations,
-        chi2: minimum.data_cost,
-        chi2_stated,
-        degrees_of_freedom,
-        noise,
-        information,
-        weights,
-        rejected,
-        theta,
-        kept_rows: KeptRows::default(),
-        model,
-    })
 }

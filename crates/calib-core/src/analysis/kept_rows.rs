@@ -70,3 +70,6 @@ fn numbers(model: &Model) -> usize {
     };
     model.of_sample.iter().map(of_sample).sum()
 }
+
+#[cfg(test)]
+mod tests;

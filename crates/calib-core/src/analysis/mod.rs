@@ -8,6 +8,7 @@ pub(crate) mod closure;
 pub(crate) mod compare;
 pub(crate) mod dependence;
 pub(crate) mod estimate;
+mod finish;
 pub(crate) mod folds;
 pub(crate) mod gauge;
 pub(crate) mod gear_ratio;

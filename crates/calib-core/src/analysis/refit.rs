@@ -1,6 +1,7 @@
 //! Given observations fitted again under another statement of the same problem.
 
-use crate::analysis::estimate::{Fit, Found, Outcome, finish};
+use crate::analysis::estimate::{Fit, Found};
+use crate::analysis::finish::{Outcome, finish};
 use crate::analysis::precision::FULL;
 use crate::analysis::settings::Settings;
 use crate::analysis::solution::Solution;

@@ -188,12 +188,42 @@ fn add_priors(model: &Model, middle: &mut DMatrix<f64>) {
 
 /// Aᵀ(I − Q)^(-½) w of a sample.
 fn adjusted_score(s: &Whitened, c: &DMatrix<f64>) -> DVector<f64> {
-    let m = s.w.len();
-    // I − Q = U diag(λ) Uᵀ
     let taken = s.a.gram_with(c);
+    let adjusted = by_series(&taken, &s.w).unwrap_or_else(|| by_eigenvectors(&taken, &s.w));
+    let mut score = DVector::zeros(c.nrows());
+    s.a.add_transposed_vector(&adjusted, &mut score);
+    score
+}
+
+/// (I − Q)^(-½) w = Σ_k (2k choose k) (Q/4)ᵏ w; `None` where the norm of Q allows no quick end.
+fn by_series(taken: &DMatrix<f64>, w: &DVector<f64>) -> Option<DVector<f64>> {
+    /// Each term is at most this part of the one before: fifty terms are enough.
+    const NORM: f64 = 0.5;
+    const TERMS: u32 = 60;
+    let norm = taken.norm();
+    if norm.is_nan() || norm >= NORM {
+        return None;
+    }
+    let enough = f64::EPSILON * w.norm();
+    let (mut sum, mut term) = (w.clone(), w.clone());
+    let mut next = w.clone();
+    for k in 1..TERMS {
+        let factor = f64::from(2 * k - 1) / f64::from(2 * k);
+        next.gemv(factor, taken, &term, 0.0);
+        std::mem::swap(&mut term, &mut next);
+        sum += &term;
+        if term.norm() <= enough {
+            return Some(sum);
+        }
+    }
+    None
+}
+
+/// The same by I − Q = U diag(λ) Uᵀ.
+fn by_eigenvectors(taken: &DMatrix<f64>, w: &DVector<f64>) -> DVector<f64> {
+    let m = w.len();
     let eigen = (DMatrix::identity(m, m) - taken).symmetric_eigen();
-    // (I − Q)^(-½) w = U diag(λ^(-½)) Uᵀ w
-    let mut coefficients = eigen.eigenvectors.tr_mul(&s.w);
+    let mut coefficients = eigen.eigenvectors.tr_mul(w);
     for k in 0..m {
         let left = eigen.eigenvalues[k];
         coefficients[k] = if left > LEVERAGE_LEFT {
@@ -202,8 +232,33 @@ fn adjusted_score(s: &Whitened, c: &DMatrix<f64>) -> DVector<f64> {
             0.0
         };
     }
-    let adjusted = &eigen.eigenvectors * coefficients;
-    let mut score = DVector::zeros(c.nrows());
-    s.a.add_transposed_vector(&adjusted, &mut score);
-    score
+    &eigen.eigenvectors * coefficients
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Q of every size of leverage up to where the series ends.
+    #[test]
+    fn series_and_eigenvectors_agree() {
+        for (m, norm) in [(3, 0.0), (3, 1e-3), (12, 0.1), (24, 0.3), (24, 0.49)] {
+            let a = DMatrix::from_fn(m, 2 * m, |i, j| {
+                (1.0 + 3.7 * i as f64 + 1.3 * j as f64).sin()
+            });
+            let mut q = &a * a.transpose();
+            let scale = norm / q.norm();
+            q *= scale;
+            let w = DVector::from_fn(m, |i, _| (0.3 + 2.1 * i as f64).cos());
+            let series = by_series(&q, &w).unwrap();
+            let expected = by_eigenvectors(&q, &w);
+            assert!((series - &expected).norm() < 1e-13 * expected.norm());
+        }
+        // A row that the parameters take up altogether carries nothing.
+        let q = DMatrix::from_diagonal(&DVector::from_vec(vec![1.0, 0.25]));
+        let w = DVector::from_vec(vec![3.0, 3.0]);
+        assert!(by_series(&q, &w).is_none());
+        let left = by_eigenvectors(&q, &w);
+        assert!(left[0] == 0.0 && (left[1] - 3.0 / 0.75_f64.sqrt()).abs() < 1e-13);
+    }
 }

@@ -73,6 +73,9 @@ pub struct MinimizeSettings {
     pub decrement: f64,
     /// First damping λ: 1e-3 is a prior of 30 natural scales (30°, 30 cm) on the step.
     pub damping: f64,
+    /// What is left of the decrement after a step near the minimum, at most, as minimizations that ended nearby showed; 1: not known. With it a step is
+    /// the last one where little enough will be left, which otherwise one more linearization shows.
+    pub(crate) contraction: f64,
 }
 
 impl Default for MinimizeSettings {
@@ -81,6 +84,7 @@ impl Default for MinimizeSettings {
             max_iterations: 100,
             decrement: 1e-12,
             damping: 1e-3,
+            contraction: 1.0,
         }
     }
 }
@@ -90,6 +94,13 @@ const SLOW: f64 = 0.1;
 /// …once the fit is within this squared distance (in σ²) of the minimum: farther away the curvature changes
 /// from step to step and a secant of it misleads.
 const NEAR: f64 = 1.0;
+
+/// Steps with a decrement below this are near enough to the minimum for contraction to be the same from one to the next…
+const CONTRACTS: f64 = 10.0;
+/// …down to this, where rounding begins to count…
+const ROUNDS_BELOW: f64 = 1e-7;
+/// …and this many times as much as was left elsewhere is expected to be left.
+const CONTRACTION_MARGIN: f64 = 10.0;
 
 /// Priors that cost no more than this (in σ²) say nothing: it is all that sliding to their centers can gain…
 const NOTHING: f64 = 1e-4;
@@ -143,6 +154,8 @@ pub struct Minimum {
     pub prior_cost: f64,
     /// −gᵀδ of the last step: the squared distance to the minimum in units of σ.
     pub decrement: f64,
+    /// The largest part of the decrement that was left after a step near the minimum; `None`: no step was followed by another.
+    pub(crate) contraction: Option<f64>,
 }
 
 /// Minimizes `eᵀV⁻¹e + prior` from `start` with given weights (one per observation) and variances
@@ -196,6 +209,7 @@ struct Descent<'a> {
     taken: Vec<Taken>,
     iterations: usize,
     evaluable: bool,
+    contraction: Option<f64>,
 }
 
 /// An accepted step.
@@ -250,6 +264,7 @@ impl<'a> Descent<'a> {
             taken: Vec::new(),
             iterations: 1,
             evaluable: true,
+            contraction: None,
         }
     }
 
@@ -293,6 +308,7 @@ impl<'a> Descent<'a> {
             data_cost: self.system.data,
             prior_cost: self.system.prior,
             decrement: self.decrement,
+            contraction: self.contraction,
         }
     }
 
@@ -430,13 +446,19 @@ impl<'a> Descent<'a> {
             1.0
         };
         let expected = self.decrement * rate;
+        if (ROUNDS_BELOW..CONTRACTS).contains(&before) {
+            let most = self.contraction.unwrap_or(0.0);
+            self.contraction = Some(most.max(self.decrement / before));
+        }
+        let left = CONTRACTION_MARGIN * self.settings.contraction * self.decrement;
+        let contracts = !self.bounded && self.decrement < CONTRACTS && left <= enough;
         let slides = || {
             let little = self.system.prior <= NOTHING && self.decrement <= SLIDE;
             little && rate > SLOW && self.seen_by_data() <= UNSEEN
         };
         let creeps = || self.creeps_for_little();
         let soon = self.constant_noise && expected <= enough;
-        if self.decrement <= enough || soon || slides() || creeps() {
+        if self.decrement <= enough || soon || contracts || slides() || creeps() {
             let fallen = self.decrement <= enough || cost(objective, &self.trial, work) <= limit;
             fallen.then_some(Step::Last)
         } else if self.constant_noise {
@@ -452,3 +474,6 @@ impl<'a> Descent<'a> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

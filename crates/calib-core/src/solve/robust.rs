@@ -228,6 +228,7 @@ const INNER: MinimizeSettings = MinimizeSettings {
     max_iterations: 4,
     decrement: 1e-3,
     damping: 1e-6,
+    contraction: 1.0,
 };
 
 /// As [`clean`], from values that are nearly right: the last round of GNC alone.
@@ -273,6 +274,10 @@ pub(crate) fn clean(
 ) -> Option<(Values, Vec<f64>, usize)> {
     /// Reweighting rounds of (2): the weights settle to 1 % in fewer than ten.
     const HUBER_ROUNDS: usize = 12;
+    let inner = MinimizeSettings {
+        contraction: start.contraction.unwrap_or(1.0),
+        ..INNER
+    };
     let limits = Limits::new(settings);
     let rows = |o: usize| model.observations[o].rows;
     let mut values = start.values.clone();
@@ -298,7 +303,7 @@ pub(crate) fn clean(
                 weights: &weights,
                 theta,
             };
-            minimize_in(objective, &values, &INNER, work)
+            minimize_in(objective, &values, &inner, work)
         };
         iterations += fit.iterations;
         values = fit.values;
@@ -327,7 +332,7 @@ pub(crate) fn clean(
                     weights: &weights,
                     theta,
                 };
-                minimize_in(objective, &values, &INNER, work)
+                minimize_in(objective, &values, &inner, work)
             };
             iterations += fit.iterations;
             values = fit.values;

@@ -1,5 +1,6 @@
 //! The kinematic table of the report: the chain to the tool before and after, with the σ of every number.
 
+use calib_geometry::so3::rpy_to_read;
 use calib_report::{DhTable, DhTableRow, DhValue, Unit};
 use calib_urdf::LinkId;
 use nalgebra::{DVector, Isometry3};
@@ -116,7 +117,7 @@ fn table(
 
 fn pose(a_from_b: &Isometry3<f64>) -> [f64; 6] {
     let t = a_from_b.translation.vector;
-    let (roll, pitch, yaw) = a_from_b.rotation.euler_angles();
+    let [roll, pitch, yaw] = rpy_to_read(&a_from_b.rotation);
     [t.x, t.y, t.z, roll, pitch, yaw]
 }
 
