@@ -569,6 +569,38 @@ fn a_dry_run_says_what_would_be_refused() {
     assert!(dir.read("arm.urdf") == edited);
 }
 
+/// A folder lets its files be replaced by others, whatever their own permissions: neither the change nor its way back does that to a protected file.
+#[test]
+fn a_protected_file_is_not_replaced() {
+    let dir = result(Scratch::new(), "result", ARM, &["elbow"]).file("arm.urdf", ARM);
+    let protect = |readonly: bool| {
+        let path = dir.path("arm.urdf");
+        let mut permissions = path.metadata().expect("there").permissions();
+        permissions.set_readonly(readonly);
+        std::fs::set_permissions(&path, permissions).expect("own file");
+    };
+    let in_place = || dir.calib(["apply", RESULT, "arm.urdf", "--in-place"]);
+    protect(true);
+    let dry = dir.calib(["apply", RESULT, "arm.urdf", "--diff"]).expect(0);
+    assert!(dry.words().contains("would be refused"), "{}", dry.stdout);
+    let ran = in_place();
+    assert_eq!(ran.code, 7, "{}", ran.stderr);
+    assert!(ran.stderr.contains("write-protected"), "{}", ran.stderr);
+    assert!(ran.stderr.contains("chmod u+w arm.urdf"), "{}", ran.stderr);
+    assert!(dir.read("arm.urdf") == ARM);
+    assert!(!dir.path("arm.urdf.changes.json").exists());
+    protect(false);
+    in_place().expect(0);
+    let changed = dir.read("arm.urdf");
+    protect(true);
+    let back = dir.calib(["revert", "arm.urdf", "--in-place"]);
+    assert_eq!(back.code, 7, "{}", back.stderr);
+    assert!(dir.read("arm.urdf") == changed);
+    protect(false);
+    dir.calib(["revert", "arm.urdf", "--in-place"]).expect(0);
+    assert!(dir.read("arm.urdf") == ARM);
+}
+
 /// The controller's YAML has sixteen digits, the expanded URDF that was calibrated six decimals.
 #[test]
 fn a_ur_arm_s_yaml_keeps_the_digits_of_what_did_not_change() {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use calib_files::{FileError, OutputFile, folder_of, remove, replace, write_new};
+use calib_files::{FileError, OutputFile, check_writable, folder_of, remove, replace, write_new};
 
 use crate::change::{Destination, FileChange};
 use crate::error::ApplyError;
@@ -77,14 +77,15 @@ fn over(files: &[FileChange]) -> Result<(), ApplyError> {
     })
 }
 
-/// Why a file is not changed in place: it was edited after an earlier change of ours.
+/// Why a file is not changed in place: it was edited after an earlier change of ours, or is write-protected.
 fn refused(file: &FileChange) -> Option<ApplyError> {
     let record = record_path(&file.path);
     let edited = record.exists() && recorded(&file.path, &file.original) == Recorded::No;
-    edited.then(|| ApplyError::ChangedAlready {
+    let edited = edited.then(|| ApplyError::ChangedAlready {
         file: file.path.clone(),
         record,
-    })
+    });
+    edited.or_else(|| check_writable(&file.path).err().map(ApplyError::from))
 }
 
 /// A dry run says what a change in place would be refused for.

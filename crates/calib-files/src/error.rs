@@ -25,6 +25,12 @@ pub enum FileError {
         /// Why.
         source: Error,
     },
+    /// The file that would be replaced may not be written to, by its own permissions.
+    #[error("{0}: the file is write-protected\n  help: allow writing (`chmod u+w {0}`), or change a copy", path.display())]
+    Protected {
+        /// The file.
+        path: PathBuf,
+    },
     /// A file that must not exist is there.
     #[error("{} exists already\n  help: {}", path.display(), self.remedy())]
     Exists {
@@ -76,6 +82,7 @@ impl FileError {
         match self {
             Self::Write { path, source } => cannot_write(path, source),
             Self::Read { .. } => "grant read permission, or choose another folder with --out",
+            Self::Protected { .. } => "allow writing, or change a copy",
             Self::Exists { .. } => "choose another name, or move it away",
             Self::Foreign { .. } => {
                 "it was not made by this program: choose another folder with --out"
@@ -95,6 +102,7 @@ impl FileError {
         match self {
             Self::Write { path, .. }
             | Self::Read { path, .. }
+            | Self::Protected { path }
             | Self::Exists { path }
             | Self::Foreign { path }
             | Self::Busy { path }

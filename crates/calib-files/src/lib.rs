@@ -21,7 +21,7 @@ pub use error::{FileError, cannot_write};
 pub use file::OutputFile;
 pub use folder::{folder_of, make_folder};
 pub use name::{LONGEST_NAME, MANIFEST, NameFault, check_name};
-pub use output::{new_folder, remove, replace, resume, start, write_new};
+pub use output::{check_writable, new_folder, remove, replace, resume, start, write_new};
 pub use results::{GrowingFile, ResultsFolder, is_unfinished, write_results};
 pub use scratch::ScratchFolder;
 pub use state::StateFile;

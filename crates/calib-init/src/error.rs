@@ -195,14 +195,6 @@ pub enum InitError {
         /// The recordings of the profile.
         recordings: Vec<String>,
     },
-    /// The profile may not be written.
-    #[error(
-        "{file}: the file is write-protected\n  help: allow writing (`chmod u+w {file}`), or edit a copy"
-    )]
-    Protected {
-        /// The profile.
-        file: String,
-    },
     /// Nothing was given to add to a profile.
     #[error(
         "{file}: no recording was given to add to it\n  help: give recordings: `calib init --edit {file} RECORDING...`"
@@ -296,7 +288,6 @@ impl InitError {
             | Self::NotInserted { file, .. }
             | Self::NothingToAdd { file }
             | Self::BesideListed { file, .. }
-            | Self::Protected { file }
             | Self::SecondUrdf { file, .. }
             | Self::Changed { file }
             | Self::Twice { file } => Some(file),
@@ -320,7 +311,7 @@ impl InitError {
             | Self::BesideListed { .. }
             | Self::NothingSeen { .. }
             | Self::NoMotion { .. } => ExitCode::Data,
-            Self::Protected { .. } | Self::Changed { .. } => ExitCode::NotWritten,
+            Self::Changed { .. } => ExitCode::NotWritten,
             _ => ExitCode::Usage,
         }
     }

@@ -157,9 +157,6 @@ fn edit<'p>(
         if text()? != old {
             return Err(InitError::Changed { file: shown }.into());
         }
-        if profile.metadata().is_ok_and(|m| m.permissions().readonly()) {
-            return Err(InitError::Protected { file: shown }.into());
-        }
         replace(profile, edited.text.as_bytes())?;
     }
     bar.set_message("check the profile");

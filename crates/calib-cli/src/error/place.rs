@@ -181,6 +181,7 @@ fn of_file(error: &FileError) -> &'static str {
     match error {
         FileError::Busy { .. } => "folder-busy",
         FileError::Name { .. } | FileError::SameName { .. } => "file-name",
+        FileError::Protected { .. } => "write-protected",
         FileError::Exists { .. } | FileError::Foreign { .. } => "file-exists",
         FileError::OtherState { .. } => "other-state",
         _ => "file-not-written",

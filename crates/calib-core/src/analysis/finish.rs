@@ -1,12 +1,12 @@
 //! What a fit means at its minimum.
 
 use crate::analysis::information::Information;
-use crate::analysis::kept_rows::KeptRows;
 use crate::analysis::levels_found::levels_found;
 use crate::analysis::observability::observe;
 use crate::analysis::solution::{Solution, describe_parameters};
 use crate::graph::error::Error;
 use crate::model::layout::Model;
+use crate::solve::kept_rows::KeptRows;
 use crate::solve::minimize::Minimum;
 use crate::solve::robust::{RejectReason, Rejection};
 

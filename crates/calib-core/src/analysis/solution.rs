@@ -3,7 +3,6 @@
 use serde::{Deserialize, Serialize};
 
 use crate::analysis::information::{INDETERMINATE, Information};
-use crate::analysis::kept_rows::KeptRows;
 use crate::analysis::observability::{Direction, Observability, directions, weak};
 use crate::graph::ids::{GroupId, ParameterId};
 use crate::graph::parameter::ParameterKind;
@@ -12,6 +11,7 @@ use crate::graph::unit::Unit;
 use crate::model::layout::Model;
 use crate::model::values::Values;
 use crate::solve::equations::{Objective, Workspace};
+use crate::solve::kept_rows::KeptRows;
 use crate::solve::minimize::SolveStatus;
 use crate::solve::normal::data_cost;
 use crate::solve::robust::Rejection;

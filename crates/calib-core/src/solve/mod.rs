@@ -7,6 +7,7 @@ pub(crate) mod compressed;
 pub(crate) mod curvature;
 pub(crate) mod dense;
 pub(crate) mod equations;
+pub(crate) mod kept_rows;
 pub(crate) mod minimize;
 pub(crate) mod noise;
 pub(crate) mod normal;

@@ -2,8 +2,8 @@ use super::*;
 use crate::example::{SAMPLES, arm};
 use crate::{Settings, solve};
 
-/// As they come from the solution at each place.
-fn anew(of: &Solution, sample: usize) -> Option<Whitened> {
+/// Formed for the solution as it is.
+fn formed(of: &Solution, sample: usize) -> Option<Whitened> {
     let mut work = at(of);
     whitened(of.objective(), &of.values, sample, &mut work)
 }
@@ -27,7 +27,7 @@ fn rows_are_formed_once_and_those_of_the_fit() {
         let first = solution.rows_of(sample, &mut work).unwrap();
         let again = solution.rows_of(sample, &mut work).unwrap();
         assert!(Arc::ptr_eq(&first, &again));
-        assert!(is_same(&first, &anew(&solution, sample).unwrap()));
+        assert!(is_same(&first, &formed(&solution, sample).unwrap()));
         let own = solution.rows_with(&solution.weights, sample, &mut work);
         assert!(Arc::ptr_eq(&first, &own.unwrap()));
     }
@@ -41,7 +41,7 @@ fn what_was_changed_has_rows_of_its_own() {
     let mut louder = solution.clone();
     louder.theta.iter_mut().for_each(|theta| *theta *= 4.0);
     let of_copy = louder.rows_of(3, &mut work).unwrap();
-    assert!(is_same(&of_copy, &anew(&louder, 3).unwrap()));
+    assert!(is_same(&of_copy, &formed(&louder, 3).unwrap()));
     assert!((of_copy.w.norm() / before.w.norm() - 0.5).abs() < 1e-12);
     louder.theta.iter_mut().for_each(|theta| *theta /= 4.0);
     louder.forget_rows();
