@@ -7,7 +7,7 @@ use calib_core::Settings;
 use calib_geometry::registration::rigid_registration;
 use calib_pipeline::PipelineError;
 use calib_pipeline::estimate::start::Start;
-use calib_pipeline::formulate::cameras;
+use calib_pipeline::formulate::cameras::{self, Outcome};
 use calib_pipeline::formulate::checked::check_data;
 use calib_pipeline::formulate::formulation::FreeSet;
 use calib_pipeline::formulate::ml;
@@ -137,11 +137,11 @@ impl Known {
         let mut fit = ml::fit(state(&inputs), &inputs, &settings)?;
         // The noise of the cameras, as in a run.
         if cameras::take(&mut inputs) {
-            let with = ml::fit(state(&inputs), &inputs, &settings)?;
-            if cameras::contradicted(&with, &fit, &settings) {
-                cameras::make_equal(&mut inputs);
-            } else {
-                fit = with;
+            let with = ml::fit(state(&inputs), &inputs, &settings).ok();
+            let outcome = cameras::outcome(with.as_ref(), &fit, &settings);
+            match with.filter(|_| outcome == Outcome::Taken) {
+                Some(with) => fit = with,
+                None => cameras::make_equal(&mut inputs),
             }
         }
         let found = fit.solution.parameters.iter();

@@ -399,8 +399,9 @@ impl<'a> Fit<'a> {
         let minimum = minimize_in(objective, start, &settings, work);
         self.iterations += minimum.iterations;
         // None < Some
-        let most = |a: Option<f64>, b: Option<f64>| if a > b { a } else { b };
-        self.contraction = most(self.contraction, minimum.contraction);
+        if minimum.contraction > self.contraction {
+            self.contraction = minimum.contraction;
+        }
         minimum
     }
 

@@ -6,6 +6,7 @@ use calib_report::{Status, Unobservable};
 
 use crate::error::PipelineError;
 use crate::formulate::bad_rows::bad_rows;
+use crate::formulate::cameras::Outcome;
 use crate::formulate::checked::Checked;
 use crate::formulate::chosen::Chosen;
 use crate::formulate::completed::beside;
@@ -141,14 +142,21 @@ fn before_cameras(
         return Ok(equal);
     }
     progress("fit again with the noise of the cameras");
-    let with = fits(inputs, checked, how, progress)?;
-    let doubted = cameras::contradicted(&with.1, &equal.1, how.settings);
-    checked.findings.extend(cameras::finding(inputs, doubted));
-    if doubted {
-        (*inputs, checked.tracks) = before;
-        return Ok(equal);
+    let findings = checked.findings.clone();
+    // What was fitted without them does not depend on a fit with them.
+    let with = fits(inputs, checked, how, progress).ok();
+    let outcome = cameras::outcome(with.as_ref().map(|w| &w.1), &equal.1, how.settings);
+    if with.is_none() {
+        checked.findings = findings;
     }
-    Ok(with)
+    checked.findings.extend(cameras::finding(inputs, outcome));
+    match with.filter(|_| outcome == Outcome::Taken) {
+        Some(with) => Ok(with),
+        None => {
+            (*inputs, checked.tracks) = before;
+            Ok(equal)
+        }
+    }
 }
 
 /// How to fit.

@@ -92,22 +92,44 @@ pub fn scale(inputs: &Inputs) -> Option<f64> {
     inputs.recordings.values().find_map(of)
 }
 
-/// Whether left-out poses are likelier with equal noise than `with` the cameras.
+/// What becomes of the cameras.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Outcome {
+    /// They are the weights.
+    Taken,
+    /// Left-out poses are likelier with equal noise.
+    Doubted,
+    /// With them there is no fit, or one that has not converged where that with equal noise has.
+    NoFit,
+}
+
+/// Of a fit `with` the cameras, where there is one, beside that with equal noise.
 #[must_use]
-pub fn contradicted(with: &MlFit, equal: &MlFit, settings: &Settings) -> bool {
+pub fn outcome(with: Option<&MlFit>, equal: &MlFit, settings: &Settings) -> Outcome {
+    let converged = |fit: &MlFit| fit.solution.status.is_converged();
+    let Some(with) = with.filter(|with| converged(with) || !converged(equal)) else {
+        return Outcome::NoFit;
+    };
     let by = with.solution.likelier_by(&equal.solution, settings);
-    by.is_some_and(|by| by < -DOUBTED)
+    match by.is_some_and(|by| by < -DOUBTED) {
+        true => Outcome::Doubted,
+        false => Outcome::Taken,
+    }
 }
 
 /// What became of the cameras; `None` where they see all directions alike.
-pub(crate) fn finding(inputs: &mut Inputs, doubted: bool) -> Option<Finding> {
+pub(crate) fn finding(inputs: &mut Inputs, outcome: Outcome) -> Option<Finding> {
     let ratio = |shape: &mut Matrix3<f64>| {
         let of = symmetric_eigen_small(shape).values;
         (of.max() / of.min()).sqrt()
     };
     let shapes = inputs.recordings.values_mut().flat_map(by_camera);
     let ratio = median(shapes.map(ratio).collect()).filter(|ratio| *ratio > ROUND)?;
-    let form = if doubted { "doubted" } else { "taken" };
+    let form = match outcome {
+        Outcome::Taken => "taken",
+        Outcome::Doubted => "doubted",
+        Outcome::NoFit => "no_fit",
+    };
     let finding = Finding::of_kind(catalog::CAMERA_NOISE, form, About::Fit);
     Some(finding.with("ratio", Fact::ratio(ratio)))
 }

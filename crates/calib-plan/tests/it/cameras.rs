@@ -2,8 +2,11 @@
 
 use std::collections::BTreeMap;
 
+use calib_core::{Settings, SolveStatus};
 use calib_finding::{Severity, catalog};
 use calib_pipeline::estimated::{Estimated, estimated};
+use calib_pipeline::formulate::cameras::{Outcome, outcome};
+use calib_pipeline::formulate::formulation::MlFit;
 use calib_pipeline::options::{Plugins, RunOptions};
 use calib_pipeline::prepare::inputs::RobotProfile;
 use calib_pipeline::prepare::load::of_tables;
@@ -110,4 +113,38 @@ fn cameras_all_around_are_no_finding() {
     let arm = arm(4, 24, around);
     let found = run(&arm, recorded(&arm, 1));
     assert_eq!(of_cameras(&found), None);
+}
+
+/// Two cameras nearly in one place see no depth: the run has the result of equal noise, and says so.
+#[test]
+fn cameras_in_one_place_do_not_bend_a_run() {
+    for apart_mm in [1.0, 1e-4, 1e-7] {
+        let near = format!(
+            "plan:\n  cameras:\n    \
+            a: {{at_mm: [4900, 300, 900], toward_mm: [900, 300, 600], field_deg: 70}}\n    \
+            b: {{at_mm: [4900, {}, 900], toward_mm: [900, 300, 600], field_deg: 70}}\n",
+            300.0 + apart_mm
+        );
+        let (with, without) = (arm(4, 24, &near), arm(4, 24, ""));
+        let tables = recorded(&without, 1);
+        let found = run(&with, tables.clone());
+        assert_eq!(of_cameras(&found), DOUBTED, "{apart_mm} mm");
+        assert_eq!(parameters(&found), parameters(&run(&without, tables)));
+    }
+}
+
+/// A fit with the cameras that is none, or has not converged, does not stand before one with equal noise that has.
+#[test]
+fn a_fit_that_did_not_converge_is_not_taken_for_its_cameras() {
+    let arm = arm(4, 24, "");
+    let found = run(&arm, recorded(&arm, 1));
+    let equal = found.solved.fit.expect("a fit");
+    let settings = Settings::default();
+    let of = |with: Option<&MlFit>, equal: &MlFit| outcome(with, equal, &settings);
+    assert_eq!(of(Some(&equal), &equal), Outcome::Taken);
+    assert_eq!(of(None, &equal), Outcome::NoFit);
+    let mut other = equal.clone();
+    other.solution.status = SolveStatus::MaxIterations;
+    assert_eq!(of(Some(&other), &equal), Outcome::NoFit);
+    assert_eq!(of(Some(&other), &other), Outcome::Taken);
 }
