@@ -203,6 +203,15 @@ pub fn with_xacro(xacro: &str) -> Scratch {
     .file("my_arm/config/arm.yaml", YAML)
 }
 
+/// The same with the result applied, and in `next` that of the calibration after it.
+pub fn with_xacro_applied() -> Scratch {
+    let dir = with_xacro(PROPERTIES);
+    dir.calib(["apply", RESULT, "my_arm/urdf/arm.urdf.xacro", "--in-place"])
+        .expect(0);
+    let urdf = dir.read(RESULT);
+    result(dir, "next", &urdf, &["shoulder", "elbow", "wrist"])
+}
+
 #[test]
 fn a_xacro_with_properties_and_a_loaded_yaml() {
     let dir = with_xacro(PROPERTIES);

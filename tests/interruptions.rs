@@ -339,6 +339,44 @@ fn apply_to_a_xacro_and_the_yaml_that_it_loads() {
     });
 }
 
+/// Both files have a record already: each goes with its file, so that both can be reverted to what they were before the first calibration.
+#[test]
+fn a_second_apply_to_a_xacro_and_the_yaml_that_it_loads() {
+    let targets = ["my_arm/urdf/arm.urdf.xacro", "my_arm/config/arm.yaml"];
+    let originals = files(&crate::apply::with_xacro(crate::apply::PROPERTIES));
+    let apply = &["apply", "next/r.calibrated.urdf", targets[0], "--in-place"];
+    let both = |dir: &Scratch, before: &Files, after: &Files| {
+        let copied = Scratch::holding(files(dir));
+        for target in targets {
+            dir.calib(["revert", target, "--in-place"]).expect(0);
+            assert_eq!(files(dir)[target], originals[target]);
+        }
+        again(apply, 0)(&copied, before, after);
+    };
+    // A record that waits is whole as well.
+    let check = |now: &Files, before: &Files, after: &Files| {
+        let (waiting, others): (Files, Files) =
+            (now.clone().into_iter()).partition(|(name, _)| name.ends_with(".next"));
+        for (name, bytes) in &waiting {
+            assert_eq!(
+                after.get(name.trim_end_matches(".next")),
+                Some(bytes),
+                "{name}"
+            );
+        }
+        old_or_new(&others, before, after);
+    };
+    walk(&Trial {
+        name: "a second apply --in-place to a xacro with its YAML",
+        prepare: &crate::apply::with_xacro_applied,
+        arguments: apply,
+        code: 0,
+        every: 9,
+        check: &check,
+        next: &both,
+    });
+}
+
 #[test]
 fn revert_in_place_and_elsewhere() {
     let applied = || {

@@ -63,6 +63,12 @@ pub fn apply(request: &ApplyRequest) -> Result<Applied, ApplyError> {
     let mut target = Target::read(&request.target, request.yaml.as_deref())?;
     let mut notes = result.notes.clone();
     if request.destination == Destination::InPlace {
+        if files::complete(target.paths())? {
+            target = Target::read(&request.target, request.yaml.as_deref())?;
+            notes.push(
+                "an earlier change was stopped between two files: it was completed".to_owned(),
+            );
+        }
         target.recover(&mut notes)?;
     }
     let edits = result.edits(target.kind, &mut notes);

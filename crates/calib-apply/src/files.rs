@@ -3,10 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use calib_files::{FileError, OutputFile, check_writable, folder_of, remove, replace, write_new};
+use calib_urdf::{ChangeRecord, replay, sha256_hex};
 
 use crate::change::{Destination, FileChange};
 use crate::error::ApplyError;
-use crate::revert::{Recorded, record_path, recorded, waiting_path};
+use crate::revert::{Recorded, read_record, record_path, recorded, reverted, waiting_path};
 
 /// Writes the files, each with its record; nothing where they go nowhere.
 pub(super) fn write(files: &mut [FileChange], destination: &Destination) -> Result<(), ApplyError> {
@@ -38,54 +39,137 @@ pub(super) fn write(files: &mut [FileChange], destination: &Destination) -> Resu
 fn over(files: &[FileChange]) -> Result<(), ApplyError> {
     let mut records = Vec::new();
     for file in files {
-        let record = record_path(&file.path);
-        let replaces = recorded(&file.path, &file.original) == Recorded::After;
         if let Some(refused) = refused(file) {
             return Err(refused);
         }
-        let place = if replaces {
-            waiting_path(&file.path)
-        } else {
-            record.clone()
-        };
-        records.push((record, place, record_text(file)?));
+        records.push(Record::of(file)?);
     }
     let write_all = || -> Result<(), FileError> {
-        for (_, place, text) in &records {
-            replace(place, text.as_bytes())?;
+        for record in &records {
+            replace(&record.first, record.text.as_bytes())?;
         }
         files
             .iter()
             .try_for_each(|file| replace(&file.path, file.patched.text.as_bytes()))?;
-        for (record, place, text) in &records {
-            if place != record {
-                replace(record, text.as_bytes())?;
-                remove(place)?;
-            }
+        for record in records.iter().filter(|r| r.earlier.is_some()) {
+            replace(&record.path, record.text.as_bytes())?;
+            remove(&record.first)?;
         }
         Ok(())
     };
     write_all().map_err(|error| {
         // The error that counts is the first; a record stays where its file could not be restored.
-        for (file, (_, place, _)) in files.iter().zip(&records) {
+        for (file, record) in files.iter().zip(&records) {
             let changed = text_of(&file.path) == file.patched.text;
-            if !changed || replace(&file.path, file.original.as_bytes()).is_ok() {
-                let _ = remove(place);
+            if changed && replace(&file.path, file.original.as_bytes()).is_err() {
+                continue;
+            }
+            match &record.earlier {
+                Some(earlier) => {
+                    let is_there = text_of(&record.path) == *earlier;
+                    if is_there || replace(&record.path, earlier.as_bytes()).is_ok() {
+                        let _ = remove(&record.first);
+                    }
+                }
+                None => {
+                    let _ = remove(&record.first);
+                }
             }
         }
         error.into()
     })
 }
 
-/// Why a file is not changed in place: it was edited after an earlier change of ours, or is write-protected.
+/// Completes a change that was stopped: where one of the files holds it, the others get it as well, and its records take the place of the earlier ones.
+/// Whether there was any. One that was stopped before its first file is forgotten.
+pub(super) fn complete<'a>(paths: impl Iterator<Item = &'a PathBuf>) -> Result<bool, ApplyError> {
+    let waiting = paths.filter_map(|path| Waiting::of(path));
+    let waiting: Vec<Waiting<'_>> = waiting.collect();
+    if !waiting.iter().any(Waiting::holds) {
+        return Ok(false);
+    }
+    for Waiting { file, text, record } in waiting.iter().filter(|w| !w.holds()) {
+        let original = match sha256_hex(text.as_bytes()) == record.original_sha256 {
+            true => text.clone(),
+            false => reverted(file, text, &read_record(file)?)?,
+        };
+        // Edited since, or of another file: the records tell of that.
+        if let Some(changed) = replay(&original, record) {
+            check_writable(file)?;
+            replace(file, changed.as_bytes())?;
+        }
+    }
+    for Waiting { file, record, .. } in &waiting {
+        if sha256_hex(text_of(file).as_bytes()) == record.patched_sha256 {
+            let place = waiting_path(file);
+            replace(&record_path(file), text_of(&place).as_bytes())?;
+            remove(&place)?;
+        }
+    }
+    Ok(true)
+}
+
+/// A file whose change has not taken the place of an earlier one yet.
+struct Waiting<'a> {
+    file: &'a Path,
+    text: String,
+    record: ChangeRecord,
+}
+
+impl<'a> Waiting<'a> {
+    fn of(file: &'a Path) -> Option<Self> {
+        Some(Self {
+            record: serde_json::from_str(&text_of(&waiting_path(file))).ok()?,
+            text: text_of(file),
+            file,
+        })
+    }
+
+    /// Whether the file holds the change.
+    fn holds(&self) -> bool {
+        sha256_hex(self.text.as_bytes()) == self.record.patched_sha256
+    }
+}
+
+/// The record of a change.
+struct Record {
+    /// Its place in the end.
+    path: PathBuf,
+    /// Where it is written first.
+    first: PathBuf,
+    text: String,
+    /// The record that it replaces, of a change that the file holds.
+    earlier: Option<String>,
+}
+
+impl Record {
+    fn of(file: &FileChange) -> Result<Self, ApplyError> {
+        let path = record_path(&file.path);
+        let replaces = recorded(&file.path, &file.original) == Recorded::After;
+        Ok(Self {
+            first: if replaces {
+                waiting_path(&file.path)
+            } else {
+                path.clone()
+            },
+            earlier: replaces.then(|| text_of(&path)),
+            text: record_text(file)?,
+            path,
+        })
+    }
+}
+
+/// Why a file is not changed in place: it was edited after an earlier change of ours, or it or its record is write-protected.
 fn refused(file: &FileChange) -> Option<ApplyError> {
     let record = record_path(&file.path);
     let edited = record.exists() && recorded(&file.path, &file.original) == Recorded::No;
     let edited = edited.then(|| ApplyError::ChangedAlready {
         file: file.path.clone(),
-        record,
+        record: record.clone(),
     });
-    edited.or_else(|| check_writable(&file.path).err().map(ApplyError::from))
+    let all = [file.path.clone(), record, waiting_path(&file.path)];
+    let protected = || all.iter().find_map(|path| check_writable(path).err());
+    edited.or_else(|| protected().map(ApplyError::from))
 }
 
 /// A dry run says what a change in place would be refused for.
@@ -96,7 +180,8 @@ pub(super) fn announce(files: &[FileChange], destination: &Destination, notes: &
     }
 }
 
-fn text_of(path: &Path) -> String {
+/// The text of a file; empty where it cannot be read.
+pub(super) fn text_of(path: &Path) -> String {
     calib_urdf::source::read_text(path, "").unwrap_or_default()
 }
 

@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use calib_files::{OutputFile, folder_of, remove, replace, write_new};
+use calib_files::{OutputFile, check_writable, folder_of, remove, replace, write_new};
 use calib_urdf::{RevertError, source};
 
 use crate::error::ApplyError;
+use crate::files::text_of;
 use crate::revert::{read_record, record_of, record_path, reverted, waiting_path};
 use crate::target::changed_yaml;
 
@@ -65,7 +66,10 @@ pub fn revert(changed: &Path, out: &Path) -> Result<PathBuf, ApplyError> {
 /// [`ApplyError`] when the change record is missing, or the file was edited since; the file is untouched then.
 pub fn revert_in_place(changed: &Path) -> Result<PathBuf, ApplyError> {
     let original = original(changed)?;
-    replace(changed, original.as_bytes())?;
+    if text_of(changed) != original {
+        check_writable(changed)?;
+        replace(changed, original.as_bytes())?;
+    }
     remove(&record_path(changed))?;
     if waiting_path(changed).exists() {
         remove(&waiting_path(changed))?;

@@ -164,6 +164,11 @@ impl Target {
         Ok(())
     }
 
+    /// The target and the YAMLs that it loads.
+    pub(super) fn paths(&self) -> impl Iterator<Item = &PathBuf> {
+        std::iter::once(&self.path).chain(&self.yaml_paths)
+    }
+
     /// Goes back, in memory, to the first originals of files that hold an earlier change; whether there was any.
     ///
     /// # Errors

@@ -159,7 +159,7 @@ pub fn nearest_rotation(m: &Matrix3<f64>) -> Option<UnitQuaternion<f64>> {
 }
 
 /// Roll, pitch and yaw (rad) for a reader, R = Rz(y) Ry(p) Rx(r). Within 1e-7 rad of pitch ±90°, where rounding would divide one turn among roll and
-/// yaw at will, roll is 0: what is read may be off by that.
+/// yaw at will, roll is 0: what is read may be off by twice that.
 #[must_use]
 pub fn rpy_to_read(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
     /// cos p
@@ -168,7 +168,8 @@ pub fn rpy_to_read(rotation: &UnitQuaternion<f64>) -> [f64; 3] {
     let cos_pitch = m[(0, 0)].hypot(m[(1, 0)]);
     let pitch = (-m[(2, 0)]).atan2(cos_pitch);
     if cos_pitch < LOCKED {
-        return [0.0, pitch, (-m[(0, 1)]).atan2(m[(1, 1)])];
+        // + 0: no −0 is shown.
+        return [0.0, pitch, (-m[(0, 1)]).atan2(m[(1, 1)]) + 0.0];
     }
     let roll = m[(2, 1)].atan2(m[(2, 2)]);
     [roll, pitch, m[(1, 0)].atan2(m[(0, 0)])]

@@ -89,13 +89,15 @@ impl Session {
             fault: None,
         };
         let recordings = replay.recordings(&mut rng);
+        // Of other noise the priors are another part.
+        let chance = self.chance.as_ref().filter(|_| scale == 1.0);
         let again = estimated_again(recordings.clone(), &self.own);
         let whole = again.is_none() || number.is_multiple_of(WHOLE);
         // Whole trials are compared with the recording as all others are.
         let likeness = again
             .as_ref()
             .filter(|_| whole)
-            .and_then(|of| Likeness::of_estimated(of, self.chance.as_ref()));
+            .and_then(|of| Likeness::of_estimated(of, chance));
         let again = again.filter(|_| !whole);
         let mut trial = Trial {
             number,
@@ -111,7 +113,7 @@ impl Session {
             }
         };
         if let Some(fit) = &of.solved.fit {
-            let known = self.chance.as_ref().filter(|_| !whole);
+            let known = chance.filter(|_| !whole);
             let causes = causes(&of.inputs, fit, &of.checked.findings, known);
             trial.done = Some(Done {
                 converged: fit.solution.status.is_converged(),

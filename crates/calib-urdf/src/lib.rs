@@ -56,7 +56,7 @@ pub use edit::decimal;
 pub use edit::diff::{Changed, JointDiff, ModelDiff, diff, diff_models, diff_origins, unified};
 pub use edit::error::{EditError, SharedValue};
 pub use edit::patch::{Patched, PatchedFiles, patch, patch_with};
-pub use edit::revert::{ChangeRecord, Replacement, RevertError, revert, sha256_hex};
+pub use edit::revert::{ChangeRecord, Replacement, RevertError, replay, revert, sha256_hex};
 pub use edit::verify::{SecondReader, Verification, verify};
 pub use error::{Place, Problem, ReadError, ReadProblem};
 pub use kinematics::axes::{AxisPair, AxisRelation};

@@ -1,7 +1,7 @@
 //! Laws that hold for any robot: random trees, random origins, random handwriting.
 
 use calib_urdf::rpy::rotation_from_rpy;
-use calib_urdf::{RobotModel, SecondReader, UrdfEdit, diff_models, patch, revert, verify};
+use calib_urdf::{RobotModel, SecondReader, UrdfEdit, diff_models, patch, replay, revert, verify};
 use nalgebra::{Isometry3, Translation3, Unit, Vector3};
 use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
@@ -169,6 +169,8 @@ proptest! {
 
         // Back to the same bytes.
         prop_assert_eq!(&revert(&done.text, &done.record(&text)).unwrap(), &text);
+        let again = replay(&text, &done.record(&text));
+        prop_assert_eq!(again.as_ref(), Some(&done.text));
 
         // Only splices differ: what lies between them is the same.
         let mut at = (0, 0);

@@ -1,7 +1,7 @@
 //! A xacro is patched where its text is literal and stands for one joint, and refused with the reason elsewhere.
 
 use calib_urdf::{
-    Companion, Companions, Reads, UrdfEdit, patch, patch_with, references, revert,
+    Companion, Companions, Reads, UrdfEdit, patch, patch_with, references, replay, revert,
     rpy::rotation_from_rpy,
 };
 use nalgebra::{Isometry3, Translation3, Vector3};
@@ -209,6 +209,8 @@ fn numbers_in_a_loaded_yaml_are_replaced_there() {
     );
     assert_eq!(yaml.text, expected);
     assert_eq!(revert(&yaml.text, &yaml.record(YAML)).unwrap(), YAML);
+    assert_eq!(replay(YAML, &yaml.record(YAML)), Some(yaml.text.clone()));
+    assert_eq!(replay(&yaml.text, &yaml.record(YAML)), None);
     let before = done.before["elbow"];
     assert!((before.translation.vector - Vector3::new(0.4, 0.0, 0.0)).norm() < 1e-15);
     assert!((before.rotation.angle() - 0.1).abs() < 1e-15);

@@ -3,7 +3,9 @@
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
-use calib_files::{FileError, OutputFile, folder_of, input, make_folder, replace, write_new};
+use calib_files::{
+    FileError, OutputFile, check_writable, folder_of, input, make_folder, replace, write_new,
+};
 use calib_init::checked::Checked;
 use calib_init::edit::{Edited, edited};
 use calib_init::{
@@ -157,6 +159,7 @@ fn edit<'p>(
         if text()? != old {
             return Err(InitError::Changed { file: shown }.into());
         }
+        check_writable(profile)?;
         replace(profile, edited.text.as_bytes())?;
     }
     bar.set_message("check the profile");

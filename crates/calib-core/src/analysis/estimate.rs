@@ -14,6 +14,7 @@ use crate::graph::error::Error;
 use crate::graph::problem::Problem;
 use crate::model::layout::{Model, Observation};
 use crate::model::values::Values;
+use crate::solve::contraction::{Contraction, both};
 use crate::solve::equations::{Objective, Workspace};
 use crate::solve::minimize::{MinimizeSettings, Minimum, SolveStatus, minimize_in};
 use crate::solve::noise::{Scoring, score};
@@ -232,8 +233,8 @@ pub(super) struct Fit<'a> {
     precision: Precision,
     iterations: usize,
     relative_sigma: Vec<Option<f64>>,
-    /// The largest of all minimizations so far.
-    contraction: Option<f64>,
+    /// How the steps of all minimizations so far contracted.
+    contraction: Option<Contraction>,
 }
 
 impl<'a> Fit<'a> {
@@ -384,7 +385,7 @@ impl<'a> Fit<'a> {
         let own = self.settings.minimize;
         // What ends a fit is looked at once more.
         let ends = decrement <= self.last();
-        let contraction = self.contraction.filter(|_| !ends).unwrap_or(1.0);
+        let contraction = self.contraction.filter(|_| !ends);
         let settings = MinimizeSettings {
             decrement,
             contraction,
@@ -398,10 +399,7 @@ impl<'a> Fit<'a> {
         };
         let minimum = minimize_in(objective, start, &settings, work);
         self.iterations += minimum.iterations;
-        // None < Some
-        if minimum.contraction > self.contraction {
-            self.contraction = minimum.contraction;
-        }
+        self.contraction = both(self.contraction, minimum.contraction);
         minimum
     }
 

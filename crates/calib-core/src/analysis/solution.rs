@@ -94,7 +94,7 @@ pub struct NoiseEstimate {
     pub samples: usize,
 }
 
-/// Everything that a solve found.
+/// Everything that a solve found. Its analyses keep what they have in common: to change a solution, change a copy that was not looked at.
 #[derive(Debug, Clone)]
 #[non_exhaustive]
 pub struct Solution {

@@ -415,7 +415,7 @@ fn values_at(
         max_iterations: 20,
         decrement: 1e-4,
         damping: 1e-6,
-        contraction: 1.0,
+        contraction: None,
     };
     let objective = Objective {
         model,

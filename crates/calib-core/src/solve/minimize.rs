@@ -34,6 +34,7 @@ use serde::{Deserialize, Serialize};
 use crate::model::layout::Model;
 use crate::model::values::Values;
 use crate::solve::bounded::{Damped, bounded_step};
+use crate::solve::contraction::{Contraction, both};
 use crate::solve::curvature::Curvature;
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
 use crate::solve::normal::{accumulate, cost};
@@ -73,9 +74,9 @@ pub struct MinimizeSettings {
     pub decrement: f64,
     /// First damping λ: 1e-3 is a prior of 30 natural scales (30°, 30 cm) on the step.
     pub damping: f64,
-    /// What is left of the decrement after a step near the minimum, at most, as minimizations that ended nearby showed; 1: not known. With it a step is
-    /// the last one where little enough will be left, which otherwise one more linearization shows.
-    pub(crate) contraction: f64,
+    /// How steps contract, as minimizations that ended nearby showed. A step is the last one where little enough will be left, which otherwise one more
+    /// linearization shows.
+    pub(crate) contraction: Option<Contraction>,
 }
 
 impl Default for MinimizeSettings {
@@ -84,7 +85,7 @@ impl Default for MinimizeSettings {
             max_iterations: 100,
             decrement: 1e-12,
             damping: 1e-3,
-            contraction: 1.0,
+            contraction: None,
         }
     }
 }
@@ -94,13 +95,6 @@ const SLOW: f64 = 0.1;
 /// …once the fit is within this squared distance (in σ²) of the minimum: farther away the curvature changes
 /// from step to step and a secant of it misleads.
 const NEAR: f64 = 1.0;
-
-/// Steps with a decrement below this are near enough to the minimum for contraction to be the same from one to the next…
-const CONTRACTS: f64 = 10.0;
-/// …down to this, where rounding begins to count…
-const ROUNDS_BELOW: f64 = 1e-7;
-/// …and this many times as much as was left elsewhere is expected to be left.
-const CONTRACTION_MARGIN: f64 = 10.0;
 
 /// Priors that cost no more than this (in σ²) say nothing: it is all that sliding to their centers can gain…
 const NOTHING: f64 = 1e-4;
@@ -154,8 +148,8 @@ pub struct Minimum {
     pub prior_cost: f64,
     /// −gᵀδ of the last step: the squared distance to the minimum in units of σ.
     pub decrement: f64,
-    /// The largest part of the decrement that was left after a step near the minimum; `None`: no step was followed by another.
-    pub(crate) contraction: Option<f64>,
+    /// How its steps contracted; `None`: none near the minimum was followed by another.
+    pub(crate) contraction: Option<Contraction>,
 }
 
 /// Minimizes `eᵀV⁻¹e + prior` from `start` with given weights (one per observation) and variances
@@ -209,7 +203,9 @@ struct Descent<'a> {
     taken: Vec<Taken>,
     iterations: usize,
     evaluable: bool,
-    contraction: Option<f64>,
+    contraction: Option<Contraction>,
+    /// The damping was raised for the step that is proposed: it is shorter for that.
+    raised: bool,
 }
 
 /// An accepted step.
@@ -265,6 +261,7 @@ impl<'a> Descent<'a> {
             iterations: 1,
             evaluable: true,
             contraction: None,
+            raised: false,
         }
     }
 
@@ -315,6 +312,7 @@ impl<'a> Descent<'a> {
     /// One accepted step, with as much damping as it takes.
     fn descend(&mut self, work: &mut Workspace) -> Step {
         let before = self.decrement;
+        self.raised = false;
         loop {
             if self.propose()
                 && let Some(outcome) = self.judge(before, work)
@@ -326,6 +324,7 @@ impl<'a> Descent<'a> {
             }
             self.curvature.slow |= self.decrement < NEAR;
             self.damping = (self.damping * 10.0).max(1e-3);
+            self.raised = true;
             if self.damping > MAX_DAMPING {
                 return Step::None;
             }
@@ -446,12 +445,18 @@ impl<'a> Descent<'a> {
             1.0
         };
         let expected = self.decrement * rate;
-        if (ROUNDS_BELOW..CONTRACTS).contains(&before) {
-            let most = self.contraction.unwrap_or(0.0);
-            self.contraction = Some(most.max(self.decrement / before));
+        if let Some(last) = self.taken.last()
+            && !self.raised
+        {
+            let seen = Contraction::of(before, self.decrement, last.damping);
+            self.contraction = both(self.contraction, seen);
         }
-        let left = CONTRACTION_MARGIN * self.settings.contraction * self.decrement;
-        let contracts = !self.bounded && self.decrement < CONTRACTS && left <= enough;
+        let known = self
+            .settings
+            .contraction
+            .filter(|_| !self.raised && !self.bounded);
+        let left = known.and_then(|known| known.left(self.decrement, self.damping));
+        let contracts = left.is_some_and(|left| left <= enough);
         let slides = || {
             let little = self.system.prior <= NOTHING && self.decrement <= SLIDE;
             little && rate > SLOW && self.seen_by_data() <= UNSEEN

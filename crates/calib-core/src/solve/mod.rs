@@ -4,6 +4,7 @@ pub(crate) mod bounded;
 pub(crate) mod chunks;
 pub(crate) mod components;
 pub(crate) mod compressed;
+pub(crate) mod contraction;
 pub(crate) mod curvature;
 pub(crate) mod dense;
 pub(crate) mod equations;

@@ -25,6 +25,7 @@ use crate::model::layout::Model;
 use crate::model::path::Derivatives;
 use crate::model::values::Values;
 use crate::solve::chunks::{chunked, is_one_chunk};
+use crate::solve::contraction::both;
 use crate::solve::equations::{Objective, Workspace};
 use crate::solve::minimize::{MinimizeSettings, Minimum, minimize_in};
 use crate::solve::rows::SampleRows;
@@ -228,7 +229,7 @@ const INNER: MinimizeSettings = MinimizeSettings {
     max_iterations: 4,
     decrement: 1e-3,
     damping: 1e-6,
-    contraction: 1.0,
+    contraction: None,
 };
 
 /// As [`clean`], from values that are nearly right: the last round of GNC alone.
@@ -274,8 +275,8 @@ pub(crate) fn clean(
 ) -> Option<(Values, Vec<f64>, usize)> {
     /// Reweighting rounds of (2): the weights settle to 1 % in fewer than ten.
     const HUBER_ROUNDS: usize = 12;
-    let inner = MinimizeSettings {
-        contraction: start.contraction.unwrap_or(1.0),
+    let mut inner = MinimizeSettings {
+        contraction: start.contraction,
         ..INNER
     };
     let limits = Limits::new(settings);
@@ -306,6 +307,7 @@ pub(crate) fn clean(
             minimize_in(objective, &values, &inner, work)
         };
         iterations += fit.iterations;
+        inner.contraction = both(inner.contraction, fit.contraction);
         values = fit.values;
     }
     let d2 = distances(model, &values, theta, mask, work)?;
@@ -335,6 +337,7 @@ pub(crate) fn clean(
                 minimize_in(objective, &values, &inner, work)
             };
             iterations += fit.iterations;
+            inner.contraction = both(inner.contraction, fit.contraction);
             values = fit.values;
             if mu <= 1.0 {
                 break;

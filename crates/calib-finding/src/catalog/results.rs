@@ -131,7 +131,7 @@ super::topic! {
             "Check the places and fields of the cameras (`plan: {{cameras: …}}`): the σ of a plan that was made with them does not hold.";
         "no_fit": Warning,
             "The cameras of the profile would make the noise of a marker {ratio} times as large along one direction as along another (median). With that noise the fit has no result or does not converge: it uses equal noise.",
-            "Check the places and fields of the cameras (`plan: {{cameras: …}}`): two that stand side by side say nothing of depth.";
+            "Check the places and fields of the cameras (`plan: {{cameras: …}}`): two in one place say nothing of depth.";
     }
     /// The tracker's noise in a recording is another one than in the others.
     RECORDING_NOISE = "recording-noise" {

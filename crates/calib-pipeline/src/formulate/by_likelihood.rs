@@ -142,13 +142,9 @@ fn before_cameras(
         return Ok(equal);
     }
     progress("fit again with the noise of the cameras");
-    let findings = checked.findings.clone();
     // What was fitted without them does not depend on a fit with them.
     let with = fits(inputs, checked, how, progress).ok();
     let outcome = cameras::outcome(with.as_ref().map(|w| &w.1), &equal.1, how.settings);
-    if with.is_none() {
-        checked.findings = findings;
-    }
     checked.findings.extend(cameras::finding(inputs, outcome));
     match with.filter(|_| outcome == Outcome::Taken) {
         Some(with) => Ok(with),

@@ -2,7 +2,8 @@
 //!
 //! What a few cameras on one side say of a marker's depth is several times less certain than what they say across it. Equal weights spend
 //! that on the robot; the covariances of a triangulation, [`PlanSpec::covariance`], do not. They are relative: their traces are those of the
-//! σ per coordinate, on average over all that was seen. Where the recordings are likelier with equal noise, it stays equal.
+//! σ per coordinate, on average over all that was seen. Where the recordings are likelier with equal noise, or have no
+//! fit with this one, it stays equal.
 //!
 //! [`PlanSpec::covariance`]: calib_profile::PlanSpec::covariance
 

@@ -224,3 +224,19 @@ pub fn revert(patched_text: &str, record: &ChangeRecord) -> Result<String, Rever
     }
     Ok(original)
 }
+
+/// The patched text again from the original one; `None` where the record does not describe it.
+#[must_use]
+pub fn replay(original: &str, record: &ChangeRecord) -> Option<String> {
+    let mut patched = String::with_capacity(original.len());
+    let mut rest = original;
+    for replacement in &record.replacements {
+        let kept = replacement.at.checked_sub(patched.len())?;
+        patched.push_str(rest.get(..kept)?);
+        patched.push_str(&replacement.new);
+        rest = rest.get(kept..)?.strip_prefix(replacement.old.as_str())?;
+    }
+    patched.push_str(rest);
+    let is_it = sha256_hex(patched.as_bytes()) == record.patched_sha256;
+    is_it.then_some(patched)
+}

@@ -11,10 +11,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use rayon::prelude::*;
 
-use super::ChangeSettings;
 use super::columns::Pattern;
 use super::levels::{Drawn, Levels, Tests};
 use super::sums::Design;
+use super::{ChangeSettings, Moved};
 
 /// What is drawn of a prior's σ: robots are nearer to their drawings than priors say, and F, which T counts from, is smaller for it. Drawn in
 /// full, 1.5 % of clean recordings of six and ten poses were called changed.
@@ -23,9 +23,15 @@ const OF_PRIORS: f64 = 0.4;
 /// Data sets that are simulated with the same products.
 const TOGETHER: usize = 10;
 
-/// Distribution of the largest T under the model. It is that of all data from the same postures, markers and noise.
+/// Distribution of the largest T under the model: that of all data from the same postures and markers, with the same noise and priors.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ChanceOfChanges {
+    /// What may have moved.
+    pub(super) moved: Vec<Moved>,
+    /// Samples that are scanned.
+    pub(super) samples: usize,
+    /// Levels of the noise that each change is tried with.
+    pub(super) levels: usize,
     /// By candidate: T that its best range exceeds in a tenth of the draws.
     pub(super) quantiles: Vec<f64>,
     /// Excess over the quantiles that all candidates together exceed with the stated chance.
@@ -74,16 +80,25 @@ impl ChanceOfChanges {
         if !seen.is_some_and(explain) {
             draw(&mut draws, all);
         }
-        Self::of(&draws, count, settings.level)
-    }
-
-    fn of(draws: &[Vec<f64>], count: usize, level: f64) -> Self {
-        let quantiles = quantiles(draws, count);
+        let quantiles = quantiles(&draws, count);
         let largest = draws.iter().map(|d| excess(d, &quantiles));
         Self {
-            threshold: tail(largest.collect(), level),
+            moved: Vec::new(),
+            samples: 0,
+            levels: levels.designs.len(),
+            threshold: tail(largest.collect(), settings.level),
             quantiles,
         }
+    }
+
+    /// Whether it is that of so many other samples as well. With few of them the level of the noise is found again beside each change, by which T depends on
+    /// the data themselves; a sample less is nothing then either way, and some of a hundred little.
+    pub(super) fn holds_for(&self, moved: &[Moved], samples: usize, levels: usize) -> bool {
+        /// One in so many may be missing.
+        const MISSING: usize = 20;
+        let (few, many) = (samples.min(self.samples), samples.max(self.samples));
+        let one_level = levels == 1 && self.levels == 1;
+        one_level && self.moved == moved && MISSING * (many - few) <= many
     }
 }
 

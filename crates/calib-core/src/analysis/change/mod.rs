@@ -80,7 +80,8 @@ pub struct ChangeSettings {
     pub level: f64,
     /// Seed of the simulation.
     pub seed: u64,
-    /// What a simulation gave for the same postures, markers and noise, in place of one of its own; not looked at where what may have moved differs.
+    /// What [`Solution::chance_of_changes`] gave for data from the same postures and markers with the same noise, in place of a simulation; not looked at where
+    /// the candidates, the count of samples or the levels of the noise show that it is not the same.
     pub known: Option<ChanceOfChanges>,
 }
 
@@ -341,12 +342,18 @@ impl Solution {
         let (used, borders) = (self.looked_at().samples, &settings.borders);
         let thin = thinned(&used, borders);
         // With few samples the scan itself is small enough to be simulated.
-        if thin.len() == used.len() {
-            return Some(ChanceOfChanges::simulate(levels, tests, seen, settings));
-        }
-        let fewer = Levels::of(Design::new(self, candidates, &thin, &thin, borders)?);
-        let tests = fewer.tests();
-        Some(ChanceOfChanges::simulate(&fewer, &tests, seen, settings))
+        let simulated = if thin.len() == used.len() {
+            ChanceOfChanges::simulate(levels, tests, seen, settings)
+        } else {
+            let fewer = Levels::of(Design::new(self, candidates, &thin, &thin, borders)?);
+            ChanceOfChanges::simulate(&fewer, &fewer.tests(), seen, settings)
+        };
+        Some(ChanceOfChanges {
+            moved: candidates.moved(),
+            samples: used.len(),
+            levels: levels.designs.len(),
+            ..simulated
+        })
     }
 
     fn scan(&self, settings: &ChangeSettings) -> Option<ChangeScan> {
@@ -366,8 +373,10 @@ impl Solution {
             .iter()
             .map(|f| f.as_ref().map_or(0.0, |f| f.score))
             .collect();
-        let known = settings.known.as_ref();
-        let known = known.filter(|known| known.quantiles.len() == candidates.list.len());
+        let moved = candidates.moved();
+        let holds =
+            |known: &&ChanceOfChanges| known.holds_for(&moved, used.len(), levels.designs.len());
+        let known = settings.known.as_ref().filter(holds);
         let simulate = || self.chance_by(&candidates, (&levels, &tests), Some(&seen), settings);
         let mut chance = known.cloned().or_else(simulate)?;
         let mut changes: Vec<(usize, Change)> = Vec::new();
