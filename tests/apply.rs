@@ -212,6 +212,44 @@ pub fn with_xacro_applied() -> Scratch {
     result(dir, "next", &urdf, &["shoulder", "elbow", "wrist"])
 }
 
+/// Records that wait belong to a change that was stopped: before its first file they are removed, lest a later change complete that one; between its files it
+/// is completed, and a dry run says so.
+#[test]
+fn what_a_stopped_second_apply_left_is_removed_or_completed() {
+    let next = "next/r.calibrated.urdf";
+    let xacro = "my_arm/urdf/arm.urdf.xacro";
+    let targets = [xacro, "my_arm/config/arm.yaml"];
+    let done = with_xacro_applied();
+    done.calib(["apply", next, xacro, "--in-place"]).expect(0);
+    let waiting = |file: &str| format!("{file}.changes.json.next");
+    let stopped = || {
+        targets.iter().fold(with_xacro_applied(), |dir, file| {
+            dir.file(&waiting(file), done.read(&format!("{file}.changes.json")))
+        })
+    };
+    let dir = stopped();
+    let before = targets.map(|file| dir.read(file));
+    dir.calib(["apply", RESULT, xacro, "--in-place"]).expect(0);
+    assert_eq!(targets.map(|file| dir.read(file)), before);
+    assert!(!targets.iter().any(|file| dir.path(&waiting(file)).exists()));
+    for changed in targets {
+        let dir = stopped().file(changed, done.read(changed));
+        let dry = dir.calib(["apply", next, xacro, "--diff"]);
+        assert_eq!(dry.code, 3, "{}", dry.stderr);
+        assert!(
+            dry.stderr.contains("complete it with --in-place"),
+            "{}",
+            dry.stderr
+        );
+        dir.calib(["apply", next, xacro, "--in-place"]).expect(0);
+        assert_eq!(
+            targets.map(|file| dir.read(file)),
+            targets.map(|file| done.read(file))
+        );
+        assert!(!targets.iter().any(|file| dir.path(&waiting(file)).exists()));
+    }
+}
+
 #[test]
 fn a_xacro_with_properties_and_a_loaded_yaml() {
     let dir = with_xacro(PROPERTIES);

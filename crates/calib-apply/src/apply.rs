@@ -72,7 +72,14 @@ pub fn apply(request: &ApplyRequest) -> Result<Applied, ApplyError> {
         target.recover(&mut notes)?;
     }
     let edits = result.edits(target.kind, &mut notes);
-    let (patched, state) = patched(&result, &mut target, &edits, &mut notes)?;
+    let (patched, state) = match patched(&result, &mut target, &edits, &mut notes) {
+        Err(ApplyError::PartlyApplied { target: file, .. })
+            if files::is_stopped(target.paths()) =>
+        {
+            return Err(ApplyError::Stopped { file });
+        }
+        other => other?,
+    };
     let mut moved = diff_origins(
         &result.changed(&result.before),
         &result.changed(&result.after),

@@ -112,6 +112,15 @@ pub enum ApplyError {
         /// Joints that the target and the result share.
         joints: usize,
     },
+    /// An earlier change was stopped between the target and a file that it loads.
+    #[error(
+        "{}: an earlier change was stopped between this file and one that it loads\n  help: complete it with --in-place",
+        file.display()
+    )]
+    Stopped {
+        /// The target.
+        file: PathBuf,
+    },
     /// The target's origins are not those that the calibration started from.
     #[error(
         "{}: its origins are not those that were calibrated: they differ in {}\n  help: apply to the nominal URDF that the profile names, or calibrate with this one",

@@ -81,11 +81,14 @@ fn over(files: &[FileChange]) -> Result<(), ApplyError> {
 }
 
 /// Completes a change that was stopped: where one of the files holds it, the others get it as well, and its records take the place of the earlier ones.
-/// Whether there was any. One that was stopped before its first file is forgotten.
+/// Whether there was any. Records of one that was stopped before its first file are removed: a later change that is stopped must not complete that one.
 pub(super) fn complete<'a>(paths: impl Iterator<Item = &'a PathBuf>) -> Result<bool, ApplyError> {
     let waiting = paths.filter_map(|path| Waiting::of(path));
     let waiting: Vec<Waiting<'_>> = waiting.collect();
     if !waiting.iter().any(Waiting::holds) {
+        for Waiting { file, .. } in &waiting {
+            remove(&waiting_path(file))?;
+        }
         return Ok(false);
     }
     for Waiting { file, text, record } in waiting.iter().filter(|w| !w.holds()) {
@@ -107,6 +110,13 @@ pub(super) fn complete<'a>(paths: impl Iterator<Item = &'a PathBuf>) -> Result<b
         }
     }
     Ok(true)
+}
+
+/// Whether a change was stopped between these files.
+pub(super) fn is_stopped<'a>(paths: impl Iterator<Item = &'a PathBuf>) -> bool {
+    paths
+        .filter_map(|path| Waiting::of(path))
+        .any(|w| w.holds())
 }
 
 /// A file whose change has not taken the place of an earlier one yet.

@@ -73,7 +73,7 @@ pub fn new_folder(path: &Path, files: &[OutputFile]) -> Result<(), FileError> {
     disk::sync_folder(parent).map_err(FileError::write(parent))
 }
 
-/// For files of a user: that nobody may write to one, though its folder lets it be replaced by another, is what its owner asked for.
+/// Refuses a file without write permission. Its folder would let it be replaced all the same, but its owner asked that it stay.
 ///
 /// # Errors
 /// [`FileError::Protected`].

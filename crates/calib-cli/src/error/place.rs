@@ -171,6 +171,7 @@ fn of_apply(error: &ApplyError) -> &'static str {
         ApplyError::ChangedAlready { .. } => "changed-already",
         ApplyError::OtherOrigins { .. } => "other-origins",
         ApplyError::PartlyApplied { .. } => "partly-applied",
+        ApplyError::Stopped { .. } => "apply-stopped",
         ApplyError::NoRecord { .. } | ApplyError::NotARecord { .. } => "no-record",
         ApplyError::Revert { .. } => "not-reverted",
         _ => "apply",

@@ -74,8 +74,7 @@ pub struct MinimizeSettings {
     pub decrement: f64,
     /// First damping λ: 1e-3 is a prior of 30 natural scales (30°, 30 cm) on the step.
     pub damping: f64,
-    /// How steps contract, as minimizations that ended nearby showed. A step is the last one where little enough will be left, which otherwise one more
-    /// linearization shows.
+    /// How steps contract, as minimizations that ended nearby showed: the linearization that would only confirm convergence is skipped.
     pub(crate) contraction: Option<Contraction>,
 }
 

@@ -117,11 +117,6 @@ impl Candidates {
         out
     }
 
-    /// What each is.
-    pub(crate) fn moved(&self) -> Vec<Moved> {
-        self.list.iter().map(|c| c.moved).collect()
-    }
-
     fn add(&mut self, moved: Moved, pattern: Pattern, columns: usize) -> usize {
         let first = self.width;
         self.width += columns;

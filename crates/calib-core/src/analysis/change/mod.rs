@@ -39,6 +39,7 @@ use serde::{Deserialize, Serialize};
 use crate::analysis::solution::Solution;
 use crate::graph::ids::{EdgeId, FrameId};
 pub use chance::ChanceOfChanges;
+use chance::Scope;
 use columns::Candidates;
 use dependent::{Seen, in_blocks};
 use exact::{Scanned, turned};
@@ -342,18 +343,14 @@ impl Solution {
         let (used, borders) = (self.looked_at().samples, &settings.borders);
         let thin = thinned(&used, borders);
         // With few samples the scan itself is small enough to be simulated.
-        let simulated = if thin.len() == used.len() {
-            ChanceOfChanges::simulate(levels, tests, seen, settings)
-        } else {
-            let fewer = Levels::of(Design::new(self, candidates, &thin, &thin, borders)?);
-            ChanceOfChanges::simulate(&fewer, &fewer.tests(), seen, settings)
-        };
-        Some(ChanceOfChanges {
-            moved: candidates.moved(),
-            samples: used.len(),
-            levels: levels.designs.len(),
-            ..simulated
-        })
+        let scope = scope(candidates, &used, levels);
+        if thin.len() == used.len() {
+            let of = (levels, tests);
+            return Some(ChanceOfChanges::simulate(scope, of, seen, settings));
+        }
+        let fewer = Levels::of(Design::new(self, candidates, &thin, &thin, borders)?);
+        let of = (&fewer, &fewer.tests());
+        Some(ChanceOfChanges::simulate(scope, of, seen, settings))
     }
 
     fn scan(&self, settings: &ChangeSettings) -> Option<ChangeScan> {
@@ -373,10 +370,9 @@ impl Solution {
             .iter()
             .map(|f| f.as_ref().map_or(0.0, |f| f.score))
             .collect();
-        let moved = candidates.moved();
-        let holds =
-            |known: &&ChanceOfChanges| known.holds_for(&moved, used.len(), levels.designs.len());
-        let known = settings.known.as_ref().filter(holds);
+        let scope = scope(&candidates, &used, &levels);
+        let known = settings.known.as_ref();
+        let known = known.filter(|known| known.holds_for(&scope));
         let simulate = || self.chance_by(&candidates, (&levels, &tests), Some(&seen), settings);
         let mut chance = known.cloned().or_else(simulate)?;
         let mut changes: Vec<(usize, Change)> = Vec::new();
@@ -407,6 +403,14 @@ impl Solution {
             with_rejected: false,
             scatter: None,
         })
+    }
+}
+
+fn scope(candidates: &Candidates, used: &[usize], levels: &Levels) -> Scope {
+    Scope {
+        moved: candidates.list.iter().map(|c| c.moved).collect(),
+        samples: used.len(),
+        levels: levels.designs.len(),
     }
 }
 

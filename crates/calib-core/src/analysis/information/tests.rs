@@ -1,33 +1,15 @@
-use nalgebra::{Isometry3, Point3, Vector3};
+use nalgebra::{Point3, Vector3};
 
 use super::*;
-use crate::graph::chart::Chart;
+use crate::example::{Origins, joints};
 use crate::solve::whitened::whitened;
-use crate::{Axis, MarkerObservation, NoiseKind, PointId, Problem};
+use crate::{MarkerObservation, PointId};
 
 /// Unknown places of four markers, of which always others are hidden, behind two joints that scatter: the information of the whitened rows themselves.
 #[test]
 fn the_information_is_that_of_all_rows() {
     const SAMPLES: usize = 70;
-    let mut p = Problem::new(SAMPLES);
-    let (tracker, base) = (p.frame("tracker"), p.frame("base"));
-    let x = Isometry3::new(Vector3::new(0.3, 0.1, 0.2), Vector3::new(0.2, -0.4, 0.5));
-    p.unknown("place", tracker, base, x, Chart::full());
-    let noise = p.noise_group("markers", NoiseKind::Position, 1e-3, true);
-    let mut frame = base;
-    for (k, axis) in [Vector3::z_axis(), Vector3::y_axis()]
-        .into_iter()
-        .enumerate()
-    {
-        let at = p.frame(&format!("at {k}"));
-        p.unknown(&format!("origin {k}"), frame, at, x, Chart::full());
-        frame = p.frame(&format!("link {k}"));
-        let turn = 1.3 + 0.4 * k as f64;
-        let q = (0..SAMPLES).map(|i| (turn * i as f64).sin()).collect();
-        let edge = p.joint(&format!("j{k}"), at, frame, Axis::Revolute(axis), q);
-        let group = p.noise_group(&format!("n{k}"), NoiseKind::Joint, 1e-3, true);
-        p.joint_noise(edge, group);
-    }
+    let (mut p, [tracker, frame], noise) = joints(SAMPLES, Origins::Unknown);
     let place = |m: usize| Point3::from(Vector3::from_fn(|i, _| 0.1 * ((3 * m + i) as f64).sin()));
     let points: Vec<PointId> = (0..4)
         .map(|m| p.unknown_point(&format!("m{m}"), frame, place(m), Some(0.1)))
