@@ -205,6 +205,26 @@ fn rows(dir: Scratch, table: &str, change: impl Fn(usize, &[String], &mut Vec<St
     dir.file(&path, lines.join("\n") + "\n")
 }
 
+/// A table without some of its columns.
+fn without_columns(dir: Scratch, table: &str, names: &[&str]) -> Scratch {
+    let path = format!("{table}.csv");
+    let text = dir.read(&path);
+    let header = text.lines().find(|line| !line.starts_with('#'));
+    let header: Vec<&str> = header.expect("a header").split(',').collect();
+    assert!(names.iter().all(|name| header.contains(name)), "{header:?}");
+    let kept = |line: &str| {
+        let cells = line.split(',').zip(&header);
+        let cells = cells.filter(|(_, name)| !names.contains(name));
+        cells.map(|(cell, _)| cell).collect::<Vec<_>>().join(",")
+    };
+    let lines = text.lines().map(|line| match line.starts_with('#') {
+        true => line.to_owned(),
+        false => kept(line),
+    });
+    let lines: Vec<String> = lines.collect();
+    dir.file(&path, lines.join("\n") + "\n")
+}
+
 /// `to` becomes `to + factor · from`.
 pub fn coupled(dir: Scratch, tables: &[String], to: &str, from: &str, factor: f64) -> Scratch {
     tables.iter().fold(dir, |dir, table| {
@@ -360,23 +380,51 @@ fn a_joint_without_a_column() {
     };
     let dir = without(setting.folder(), "elbow_deg");
     named(&dir, "joint-column-missing", "elbow", &setting.tables());
-    // A joint that stood still is a warning only: the tracker and the mounts take it up, or the profile says where it stood.
-    let setting = Setting::new(Design::Sweeps, FOUR, 11);
-    let tables = setting.tables();
-    let dir = tables
-        .iter()
-        .filter(|t| *t != "wrist_roll")
-        .fold(setting.folder(), |dir, table| {
+    // One that stood still, at 15°, in all recordings but its own: one mistake, in those without the column.
+    for seed in 10..14 {
+        let setting = Setting::new(Design::Sweeps, FOUR, seed);
+        let lacking = setting.tables().into_iter().filter(|t| t != "wrist_roll");
+        let lacking: Vec<String> = lacking.collect();
+        let dir = lacking.iter().fold(setting.folder(), |dir, table| {
             dir.edit(&format!("{table}.csv"), "wrist_roll_deg", "note")
         });
+        let said = named(&dir, "joint-column-missing", "wrist_roll", &lacking);
+        let said = said["text"].as_str().expect("a sentence");
+        let at = ["14", "15", "16"].map(|at| format!("stood at {at} deg"));
+        assert!(at.iter().any(|at| said.contains(at)), "{said}");
+    }
+    // One that stood near 0 moves nothing by more than nominal errors do: a warning about this recording.
+    let setting = Setting::new(Design::Sweeps, FOUR, 11);
+    let dir = setting.simulated_with(&[("wrist_roll_deg: 15", "wrist_roll_deg: 0.5")]);
+    let dir = without_columns(dir, "elbow", &["wrist_roll_deg"]);
     let found = findings(&dir);
+    assert!(errors(&found).is_empty(), "{found:#?}");
     let silent = found.iter().find(|f| f["id"] == "joint-column-missing");
     let silent = silent.unwrap_or_else(|| panic!("{found:#?}"));
     assert_eq!(silent["about"]["name"], "wrist_roll");
+    assert_eq!(silent["about"]["recordings"], serde_json::json!(["elbow"]));
+}
+
+/// No single joint explains it, nor do two: where the others fit without the recording, it is that one, and its columns.
+#[test]
+fn several_joints_without_a_column_in_one_recording() {
+    let setting = Setting::new(Design::Sweeps, FOUR, 11);
+    let joints = ["waist", "shoulder", "elbow"];
+    let columns = joints.map(|joint| format!("{joint}_deg"));
+    let columns: Vec<&str> = columns.iter().map(String::as_str).collect();
+    let dir = without_columns(setting.folder(), "wrist_pitch", &columns);
+    let found = findings(&dir);
+    let wrong = errors(&found);
+    assert_eq!(wrong.len(), 1, "{found:#?}");
+    assert_eq!(wrong[0]["id"], "joint-column-missing", "{found:#?}");
     assert_eq!(
-        silent["about"]["recordings"].as_array().map(Vec::len),
-        Some(4)
+        wrong[0]["about"]["recordings"],
+        serde_json::json!(["wrist_pitch"])
     );
+    let said = wrong[0]["text"].as_str().expect("a sentence");
+    for joint in joints {
+        assert!(said.contains(joint), "{said}");
+    }
 }
 
 #[test]

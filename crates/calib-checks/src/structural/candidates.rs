@@ -225,11 +225,15 @@ fn of_missing(data: &Data, list: &mut Vec<Candidate>) {
         if data.chain.turns(joint.0).is_none() || at.is_empty() {
             continue;
         }
-        let scopes = if at.len() == present.len() {
-            vec![Scope::All]
-        } else {
-            at.into_iter().map(Scope::Recording).collect()
-        };
+        // Everywhere: in all recordings without the column.
+        let everywhere = at.len() == present.len();
+        let mut scopes = Vec::new();
+        if everywhere || at.len() > 1 {
+            scopes.push(Scope::All);
+        }
+        if !everywhere {
+            scopes.extend(at.into_iter().map(Scope::Recording));
+        }
         list.push((Hypothesis::MissingColumn { joint }, scopes));
     }
     let bodies = &data.bodies;

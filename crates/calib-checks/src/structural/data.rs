@@ -250,8 +250,9 @@ impl Data {
         if any { Ok(()) } else { Err(DataError::Empty) }
     }
 
-    /// A copy with some of the rows, in the order given.
-    pub(crate) fn select(&self, rows: &[usize]) -> Data {
+    /// A copy with some of the rows, by index, in the order given.
+    #[must_use]
+    pub fn select(&self, rows: &[usize]) -> Data {
         let bodies = self.bodies.iter().map(|body| Body {
             link: body.link,
             mounts: body.mounts.clone(),

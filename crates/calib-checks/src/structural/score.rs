@@ -63,7 +63,8 @@ fn estimated(scan: &Scan<'_>, hypothesis: &Hypothesis, scope: Scope) -> Scored {
 /// A joint without a column moved, or it stood still elsewhere than at 0. A reading of its own in every row takes up nominal
 /// errors, as a frame of its own does: where the joint hardly moved it must gain as much.
 fn empty_column(scan: &Scan<'_>, scoped: Scoped, joint: JointIndex, filled: &Data) -> Scored {
-    let mut score = penalized(scan, scoped.scope, scan.fit_corrected(filled).score);
+    let rows = special::empty_rows(scoped.scope, joint, scan.data).len();
+    let mut score = penalized(scan, rows, scan.fit_corrected(filled).score);
     let Some(found) = special::whereabouts(scoped.scope, joint, scan.data, filled) else {
         return Scored { scoped, score };
     };
@@ -116,11 +117,9 @@ fn stood_at(scan: &Scan<'_>, scoped: Scoped, joint: JointIndex, middle: f64) -> 
 }
 
 /// One estimated reading per row: the degrees of freedom that are left are fewer.
-fn penalized(scan: &Scan<'_>, scope: Scope, score: Score) -> Score {
-    let inside = |r: &&super::ids::RecordingIndex| scope.contains(**r);
-    let rows = scan.data.recording.iter().filter(inside).count() as f64;
+fn penalized(scan: &Scan<'_>, rows: usize, score: Score) -> Score {
     let (_, freedom) = scan.freedom();
-    let left = (freedom - rows) / freedom.max(1.0);
+    let left = (freedom - rows as f64) / freedom.max(1.0);
     let factor = if left > 0.1 {
         left.sqrt().recip()
     } else {

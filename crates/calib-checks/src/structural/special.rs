@@ -207,7 +207,8 @@ pub(crate) fn range(data: &Data, joint: JointIndex) -> f64 {
     }
 }
 
-fn empty_rows(scope: Scope, joint: JointIndex, data: &Data) -> Vec<usize> {
+/// Rows in the scope without a reading of the joint.
+pub(crate) fn empty_rows(scope: Scope, joint: JointIndex, data: &Data) -> Vec<usize> {
     let rows = 0..data.readings.len();
     rows.filter(|&i| scope.contains(data.recording[i]) && data.readings[i][joint.0].is_none())
         .collect()

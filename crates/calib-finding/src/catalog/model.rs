@@ -44,7 +44,10 @@ super::topic! {
             "Record this joint: export its column. If it stood still, state where: `hold: {{joint}_{unit}: 0}` in the recording.";
         "stood": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} if joint `{joint}`, which has no column, stood at {at} {unit}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
-            "Record this joint, or state where it stood: `hold: {{joint}_{unit}: {at}}` in the recording.";
+            "Record this joint, or state where the controller showed it, about {at} {unit}: `hold: {{joint}_{unit}: {at}}` in the recording.";
+        "apart": Error,
+            "The recordings fit the nominal robot to {none} rms, where nominal errors explain {limit}. Without {recordings:code} the others fit to {rest}. Joints without a column there were taken to stand at 0: {joints:code}.",
+            "Record these joints, or state for each where it stood: `hold: {{joint}_{unit}: 0}` in the recording, with the true value.";
     }
     /// A body is on another link.
     WRONG_MOUNT = "wrong-mount" {
@@ -142,7 +145,7 @@ super::topic! {
             "The recordings fit the nominal robot to {none} rms, where nominal errors explain {limit}. Without the readings of joint `{joint}`[[ in {recordings:code}]], its position taken from the tracker instead, {best} rms remain[[ ({next} without those of another joint)]]. In {off} of {rows:row} they are off by more than {least}, in half of them by more than {median}.[[ What belongs to a row stands {earlier:row} earlier in this column.]][[ What belongs to a row stands {later:row} later in this column.]]",
             "Look at the column of this joint: values that are sorted, smoothed, stuck or shifted against the other columns, or those of another joint.";
         "undecided": Error,
-            "The recordings fit the nominal robot to {none} rms, where nominal errors explain {limit}; no single mistake and no pair explains it[[; the best attempt, {leading:code}, leaves {best}]].",
+            "The recordings fit the nominal robot to {none} rms, where nominal errors explain {limit}; no single mistake and no pair explains it[[; the best attempt, {leading:code}, leaves {best}]].[[ Without {recordings:code} the others fit to {rest}.]]",
             "Check that URDF and robot are the same model, the links of the bodies, and that joints and tracker recorded the same motion.";
         "large": Warning,
             "The recordings fit the nominal robot to {none} rms, where nominal errors explain {limit}; no single mistake explains it.",

@@ -11,6 +11,7 @@ mod layout;
 mod limits;
 mod merge;
 mod named;
+mod without;
 
 use std::collections::BTreeMap;
 
@@ -159,7 +160,10 @@ fn readings(layout: &Layout<'_>, outcome: &Outcome, found: &WrongReadings) -> Fi
 /// The findings of a decision.
 fn decision(layout: &Layout<'_>, outcome: &Outcome) -> Vec<Finding> {
     match &outcome.decision {
-        Decision::Named(named) => named::findings(layout, outcome, named),
+        Decision::Named(named) => {
+            let of_columns = without::in_place_of(layout, outcome, named);
+            of_columns.map_or_else(|| named::findings(layout, outcome, named), |f| vec![f])
+        }
         Decision::Undecided { .. } if outcome.jump.is_some() => {
             let found = outcome.jump.iter();
             found
@@ -173,6 +177,11 @@ fn decision(layout: &Layout<'_>, outcome: &Outcome) -> Vec<Finding> {
                 .collect()
         }
         Decision::Undecided { leading, .. } => {
+            let apart = without::apart(layout, outcome);
+            let of_columns = |apart: &without::Apart| apart.of_columns(layout, outcome);
+            if let Some(finding) = apart.as_ref().and_then(of_columns) {
+                return vec![finding];
+            }
             let limit = outcome.expected.map(|e| e.limit);
             let beyond = limit.is_none_or(|limit| outcome.rms > NOT_NOMINAL * limit);
             let kind = if beyond || leading.is_some() {
@@ -188,6 +197,10 @@ fn decision(layout: &Layout<'_>, outcome: &Outcome) -> Vec<Finding> {
             let finding = Finding::of_kind(catalog::MODEL_DISAGREES, kind, subject)
                 .with("none", Fact::meters(outcome.rms))
                 .with_some("limit", limit.map(Fact::meters));
+            let finding = match apart {
+                Some(apart) => apart.noted(layout, finding),
+                None => finding,
+            };
             let Some(leading) = leading else {
                 return vec![finding];
             };

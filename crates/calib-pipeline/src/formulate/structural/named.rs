@@ -1,7 +1,8 @@
 //! A named mistake as findings: one for each correction, with the evidence and what is not distinguishable from it.
 
 use calib_checks::structural::{
-    Correction, Hypothesis, JointIndex, Length, Named, Outcome, PoseMistake, Scoped, UnitMistake,
+    Correction, Hypothesis, JointIndex, Length, Named, Outcome, PoseMistake, RecordingIndex,
+    Scoped, UnitMistake,
 };
 use calib_finding::{About, Fact, Finding, Id, Subject, catalog};
 
@@ -17,11 +18,28 @@ pub fn findings(layout: &Layout<'_>, outcome: &Outcome, named: &Named) -> Vec<Fi
         let finding = of_hypothesis(layout, scoped);
         let finding = with_evidence(layout, finding, outcome, named);
         let mut finding = finding.with_some("other_correction", names(others));
-        let recordings = layout.recordings_in(scoped.scope);
-        finding.subject.recordings = recordings.into_iter().map(str::to_owned).collect();
+        let recordings = layout.recordings_in(scoped.scope).into_iter();
+        let lacking = lacking(layout, outcome, scoped);
+        let concerned = recordings.filter(|name| {
+            let known = lacking.as_ref();
+            known.is_none_or(|lacking| lacking.contains(name))
+        });
+        finding.subject.recordings = concerned.map(str::to_owned).collect();
         finding
     };
     named.correction.iter().map(one).collect()
+}
+
+/// The recordings without the column that a hypothesis is about; `None` where it is about another thing.
+fn lacking<'a>(layout: &'a Layout<'_>, outcome: &Outcome, scoped: &Scoped) -> Option<Vec<&'a str>> {
+    let (Hypothesis::MissingColumn { joint } | Hypothesis::StoodAt { joint, .. }) =
+        scoped.hypothesis
+    else {
+        return None;
+    };
+    let empty = outcome.assumed_zero.iter().filter(|(j, _)| *j == joint);
+    let name = |(_, r): &(JointIndex, RecordingIndex)| layout.recordings[r.0].name.as_str();
+    Some(empty.map(name).collect())
 }
 
 fn names(all: Vec<String>) -> Option<Fact> {
