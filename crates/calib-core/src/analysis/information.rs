@@ -30,6 +30,9 @@ use crate::solve::structured::RandomPart;
 /// leaves about 1e-14, the weakest physical effect seen on real robots about 1e-6.
 pub const NULL_TOLERANCE: f64 = 1e-9;
 
+/// Sum of squares, of rows in units of their σ, that is nothing: its square root is far above the least number that has all digits.
+const NOTHING: f64 = 1e-280;
+
 /// Upper-triangular factor, built up by appending rows (row-major n × n).
 #[derive(Debug, Clone)]
 pub(crate) struct StreamedQr {
@@ -68,7 +71,8 @@ impl StreamedQr {
             for i in 0..m {
                 tail += b[i * n + k] * b[i * n + k];
             }
-            if tail == 0.0 {
+            // What rounding leaves of fewer rows than columns shrinks to its own rounding in each column, until squares are lost.
+            if tail < NOTHING {
                 continue;
             }
             let pivot = r[k * n + k];

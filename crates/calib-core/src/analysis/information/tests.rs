@@ -68,3 +68,22 @@ fn the_posterior_root_is_one_of_the_inverse() {
     assert!((&root * root.transpose() - &inverse).amax() < 1e-10 * inverse.amax());
     assert!(posterior_root(&r, &[]).is_none());
 }
+
+/// The last chunk of samples may be one row of one marker: what rounding leaves of its rows must not become infinite.
+#[test]
+fn fewer_rows_than_columns_have_a_finite_factor() {
+    for (rows, n) in [(1, 40), (2, 40), (3, 24), (3, 40), (3, 90), (6, 120)] {
+        for seed in 0..40 {
+            let a = DMatrix::from_fn(rows, n, |i, j| {
+                let x = (1.3 * (i * n + j + 1) as f64 + seed as f64).sin();
+                10.0_f64.powi(j as i32 % 5) * x
+            });
+            let mut qr = StreamedQr::new(n);
+            a.row_iter()
+                .for_each(|row| qr.append(row.transpose().as_slice()));
+            let r = qr.finish();
+            let off = r.transpose() * &r - a.transpose() * &a;
+            assert!(off.amax() < 1e-6, "{rows} × {n}, {seed}: {}", off.amax());
+        }
+    }
+}
