@@ -401,7 +401,7 @@ fn found(mistake: &Mistake) -> String {
         } => {
             let unit = if *turns { Unit::Radian } else { Unit::Meter };
             format!(
-                "Joint `{joint}` has no column, and stood at {}.",
+                "Joint `{joint}` stood at {}, which no column says.",
                 number::plain(*value, unit)
             )
         }

@@ -175,6 +175,7 @@ impl DataCheck {
                 catalog::ROWS_OUT_OF_ORDER,
                 catalog::ROW_OUTLIER,
                 catalog::ROW_CUT_OFF,
+                catalog::JOINT_VALUES_MISSING,
             ],
             Self::Validation => &[catalog::HELD_OUT_IN_TRAINING],
             Self::Structure => &[

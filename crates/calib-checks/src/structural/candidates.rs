@@ -217,6 +217,15 @@ fn of_tracker(data: &Data, everywhere: &[Scope], parts: &[Scope], list: &mut Vec
     }
 }
 
+/// Joints that never moved by their readings, and may have stood elsewhere.
+pub(crate) fn of_still(data: &Data) -> Vec<Candidate> {
+    let still = data.never_moved().into_iter();
+    let still = still.filter(|joint| data.chain.turns(joint.0).is_some());
+    still
+        .map(|joint| (Hypothesis::MissingColumn { joint }, vec![Scope::All]))
+        .collect()
+}
+
 fn of_missing(data: &Data, list: &mut Vec<Candidate>) {
     let empty = data.assumed_zero();
     let present = recordings_present(data);

@@ -27,9 +27,14 @@ pub(crate) fn correct(scoped: &Scoped, data: &Data) -> Data {
         Hypothesis::TrackerMoved | Hypothesis::MissingColumn { .. } => {}
         Hypothesis::Lag { recording, seconds } => later(&mut corrected, recording, seconds),
         Hypothesis::StoodAt { joint, value } => {
+            // Where every row has a reading, it is the readings that are wrong.
+            let empty = super::special::empty_rows(scoped.scope, joint, data);
             let rows = corrected.readings.iter_mut().zip(&inside);
             for (row, _) in rows.filter(|(_, inside)| **inside) {
-                row[joint.0].get_or_insert(value);
+                match empty.is_empty() {
+                    true => row[joint.0] = Some(value),
+                    false => _ = row[joint.0].get_or_insert(value),
+                }
             }
         }
         _ => {

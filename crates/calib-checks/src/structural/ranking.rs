@@ -30,6 +30,15 @@ impl Ranking {
         Self { none, scored }
     }
 
+    /// These hypotheses and those of another ranking of the same data.
+    pub fn with(&self, other: Self) -> Self {
+        let mut scored = self.scored.clone();
+        scored.extend(other.scored);
+        scored.sort_by(|a, b| a.score.score.total_cmp(&b.score.score));
+        let none = self.none;
+        Self { none, scored }
+    }
+
     pub fn ratio(&self, score: f64) -> f64 {
         ratio(self.none.score, score)
     }

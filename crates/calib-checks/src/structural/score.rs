@@ -50,6 +50,11 @@ fn estimated(scan: &Scan<'_>, hypothesis: &Hypothesis, scope: Scope) -> Scored {
         hypothesis: *hypothesis,
         scope,
     };
+    if let Hypothesis::MissingColumn { joint } = *hypothesis
+        && special::empty_rows(scope, joint, scan.data).is_empty()
+    {
+        return stood_elsewhere(scan, scoped, joint);
+    }
     let corrected = special::apply(&scoped, scan.data);
     match *hypothesis {
         Hypothesis::MissingColumn { joint } => empty_column(scan, scoped, joint, &corrected),
@@ -77,6 +82,16 @@ fn empty_column(scan: &Scan<'_>, scoped: Scoped, joint: JointIndex, filled: &Dat
         score.score *= OWN_FRAME;
     }
     Scored { scoped, score }
+}
+
+/// A joint whose readings never change stood elsewhere than they say; no explanation where it stood there.
+fn stood_elsewhere(scan: &Scan<'_>, scoped: Scoped, joint: JointIndex) -> Scored {
+    let (mut stood, value) = stood_at(scan, scoped, joint, 0.0);
+    let read = scan.data.readings.first().and_then(|row| row[joint.0]);
+    if read.is_none_or(|read| (value - read).abs() < AT_ZERO) {
+        stood.score.score = f64::INFINITY;
+    }
+    stood
 }
 
 /// Places where the search starts; it goes on between the neighbors of the best.

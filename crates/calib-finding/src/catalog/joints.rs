@@ -103,6 +103,15 @@ super::topic! {
             "The joint has no values.",
             "Check that the column is the measured position of this joint, and that the joint was swept.";
     }
+    /// Rows without a reading of a joint.
+    JOINT_VALUES_MISSING = "joint-values-missing" {
+        "rows": Warning,
+            "{count} of {rows:row} have no value of {joints:code}: they take no part.",
+            "Export the joint's value in every row. Where it stood still, remove its column and say where: `hold` in the recording.";
+        "gaps": Warning,
+            "Between their first and their last reading {joints:code} have none for {all}, at most {longest} at once: what the tracker saw then takes no part.",
+            "Look for the readings that the robot's log lost, or record again.";
+    }
     /// Two joints are equal in every row.
     JOINT_DUPLICATE = "joint-duplicate" {
         "": Warning,

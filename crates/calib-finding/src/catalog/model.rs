@@ -15,9 +15,12 @@ super::topic! {
     }
     /// The zero of a joint is off by a multiple of 90°.
     JOINT_OFFSET = "joint-offset" {
-        "": Error,
+        "turned": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} with {offset} added to joint `{joint}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Correct the zero of this joint: add {offset} to its column, or rotate the joint's origin in the URDF by {offset} about its axis.";
+        "stood": Error,
+            "The recordings fit the nominal robot to {none} rms, but to {best} if joint `{joint}`, whose readings never change, stood at {at} {unit}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "Say where this joint stood as the controller showed it, about {at} {unit}: in its column, or without a column by `hold: {{joint}_{unit}: {at}}` in the recording.";
     }
     /// A joint also moves with another joint.
     JOINT_COUPLING = "joint-coupling" {

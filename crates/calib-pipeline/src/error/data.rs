@@ -54,6 +54,12 @@ pub enum DataProblem {
         /// The joint.
         joint: String,
     },
+    /// A column without a value.
+    #[error("joint `{joint}` has a column, and no value in any row")]
+    NoJointValues {
+        /// The joint.
+        joint: String,
+    },
     /// A robot's log without joints.
     #[error("the robot's log has no joints")]
     NoJointsInLog,
@@ -211,6 +217,9 @@ impl DataProblem {
             Self::StreamNotAJoint { .. } => "rename it, or map it under `columns`",
             Self::JointUnit { .. } => "correct the unit in the column name",
             Self::HeldAndRecorded { .. } => "remove it from `hold`",
+            Self::NoJointValues { .. } => {
+                "export its values; where it stood still, remove the column and say where: `hold` in the recording"
+            }
             Self::NoJointsInLog => {
                 "name the columns as the robot's joints with their unit (`elbow_rad`), or map them under `columns`"
             }

@@ -22,7 +22,9 @@ use calib_profile::{Clocks, RecordingSpec, TimedPoses, Timing};
 use calib_recording::{Poses, Recording};
 
 use crate::error::{DataProblem, PipelineError};
+
 use crate::prepare::aligned::{Aligned, Alignment, ClockState, SAME_TIME};
+use crate::prepare::blanks;
 use crate::prepare::inputs::RobotProfile;
 use crate::prepare::row_noise::RowNoise;
 use crate::prepare::settled::settle;
@@ -70,12 +72,15 @@ fn aligned(
     recording: &Recording,
 ) -> Result<Aligned, DataProblem> {
     let streams = Streams::of(recording)?;
+    let joints = streams.joints.iter();
+    blanks::none_is_empty(joints.map(|(joint, stream)| (joint, stream.values.as_slice())))?;
     let mut full =
         tracker_table(recording, streams.line, &streams.times).map_err(DataProblem::NotATrack)?;
     let mut findings: Vec<Finding> = checks(&full, &Expectations::default())
         .into_iter()
         .filter(|f| f.severity != Severity::Error)
         .map(|f| f.in_recording(name))
+        .chain(blanks::of_streams(name, &streams.joints))
         .collect();
     let clocks = match streams.stated_clocks(timing) {
         Some(stated) => stated,

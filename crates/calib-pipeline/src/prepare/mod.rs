@@ -2,6 +2,7 @@
 
 pub mod align;
 pub mod aligned;
+mod blanks;
 pub mod checks;
 pub(crate) mod condensed;
 pub mod conditions;

@@ -8,6 +8,7 @@ use calib_recording::{JointUnit, Meta, Poses};
 use calib_urdf::RobotModel;
 
 use crate::error::{DataProblem, PipelineError};
+use crate::prepare::blanks;
 use crate::prepare::inputs::{Loaded, RobotProfile};
 use crate::prepare::row_noise::RowNoise;
 use crate::prepare::scatter::scatter;
@@ -58,6 +59,13 @@ pub(crate) fn prepare(
             }));
         }
     }
+    let aligned = spec.timing.is_some();
+    // Streams were asked before they became rows.
+    if !aligned {
+        let joints = poses.joints.iter();
+        blanks::none_is_empty(joints.map(|(joint, q)| (joint, q.as_slice()))).map_err(error)?;
+    }
+    findings.extend(blanks::of_table(name, &poses, aligned));
     touched_by_row(&robot.profile, name, &poses).map_err(error)?;
     let q = joint_vectors(model, spec, &poses);
     let velocities = speeds(&poses);

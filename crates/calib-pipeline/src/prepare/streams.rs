@@ -43,6 +43,18 @@ impl Scalars {
         }
     }
 
+    /// Values at these times, s, of an angle.
+    #[cfg(test)]
+    pub(crate) fn given(t: Vec<f64>, values: Vec<Option<f64>>) -> Self {
+        Self {
+            step: usual_step(&t),
+            t,
+            values,
+            unit: Some(JointUnit::Angle),
+            timeline: 0,
+        }
+    }
+
     /// All joints of a recording.
     #[must_use]
     pub fn of_joints(recording: &Recording) -> BTreeMap<String, Self> {

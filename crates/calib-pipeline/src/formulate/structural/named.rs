@@ -15,7 +15,7 @@ pub fn findings(layout: &Layout<'_>, outcome: &Outcome, named: &Named) -> Vec<Fi
     let one = |scoped: &Scoped| {
         let others = named.correction.iter().filter(|other| *other != scoped);
         let others: Vec<String> = others.map(|other| codes::of(layout, other)).collect();
-        let finding = of_hypothesis(layout, scoped);
+        let finding = of_hypothesis(layout, outcome, scoped);
         let finding = with_evidence(layout, finding, outcome, named);
         let mut finding = finding.with_some("other_correction", names(others));
         let recordings = layout.recordings_in(scoped.scope).into_iter();
@@ -39,7 +39,8 @@ fn lacking<'a>(layout: &'a Layout<'_>, outcome: &Outcome, scoped: &Scoped) -> Op
     };
     let empty = outcome.assumed_zero.iter().filter(|(j, _)| *j == joint);
     let name = |(_, r): &(JointIndex, RecordingIndex)| layout.recordings[r.0].name.as_str();
-    Some(empty.map(name).collect())
+    let names: Vec<&str> = empty.map(name).collect();
+    (!names.is_empty()).then_some(names)
 }
 
 fn names(all: Vec<String>) -> Option<Fact> {
@@ -81,7 +82,7 @@ pub(super) fn with_evidence(
 }
 
 /// Id, subject and values of one hypothesis.
-fn of_hypothesis(layout: &Layout<'_>, scoped: &Scoped) -> Finding {
+fn of_hypothesis(layout: &Layout<'_>, outcome: &Outcome, scoped: &Scoped) -> Finding {
     let of_joint = |id: Id, joint: JointIndex| {
         let name = layout.joint(joint);
         Finding::new(id, Subject::joint(name)).with("joint", Fact::name(name))
@@ -94,9 +95,13 @@ fn of_hypothesis(layout: &Layout<'_>, scoped: &Scoped) -> Finding {
         Hypothesis::Exchange { first, second } => {
             of_joint(catalog::JOINT_ORDER, first).with("other", other(second))
         }
-        Hypothesis::Offset { joint, turns } => {
-            of_joint(catalog::JOINT_OFFSET, joint).with("offset", Fact::radians(turns.angle()))
-        }
+        Hypothesis::Offset { joint, turns } => Finding::of_kind(
+            catalog::JOINT_OFFSET,
+            "turned",
+            Subject::joint(layout.joint(joint)),
+        )
+        .with("joint", Fact::name(layout.joint(joint)))
+        .with("offset", Fact::radians(turns.angle())),
         Hypothesis::Coupling {
             joint,
             source,
@@ -117,7 +122,11 @@ fn of_hypothesis(layout: &Layout<'_>, scoped: &Scoped) -> Finding {
         Hypothesis::StoodAt { joint, value } => {
             let subject = Subject::joint(layout.joint(joint));
             let (shown, unit) = layout.shown(joint, value);
-            Finding::of_kind(catalog::JOINT_COLUMN_MISSING, "stood", subject)
+            let id = match outcome.assumed_zero.iter().any(|(j, _)| *j == joint) {
+                true => catalog::JOINT_COLUMN_MISSING,
+                false => catalog::JOINT_OFFSET,
+            };
+            Finding::of_kind(id, "stood", subject)
                 .with("joint", Fact::name(layout.joint(joint)))
                 .with("at", Fact::name(format!("{shown:.0}")))
                 .with("unit", Fact::choice(unit))
