@@ -3,6 +3,7 @@
 
 mod apply;
 mod bad_input;
+mod blank_readings;
 mod blind;
 mod book;
 mod cell;

@@ -328,8 +328,8 @@ fn an_empty_column_is_named() {
     );
 }
 
-/// Outcomes where a joint has no column and stood at `value` throughout.
-fn locked(value: f64) -> Vec<(u64, Option<Hypothesis>)> {
+/// Outcomes where a joint stood at `value` throughout, and its column has `read` in every row.
+fn locked(value: f64, read: Option<f64>) -> Vec<(u64, Option<Hypothesis>)> {
     let bodies = [
         BodyKind::Markers(1),
         BodyKind::Markers(2),
@@ -346,7 +346,7 @@ fn locked(value: f64) -> Vec<(u64, Option<Hypothesis>)> {
         let joint = (1..joints.len() - 1).find(revolute).expect("one of two");
         setting.readings.iter_mut().for_each(|q| q[joint] = value);
         let mut data = setting.data(true);
-        data.readings.iter_mut().for_each(|row| row[joint] = None);
+        data.readings.iter_mut().for_each(|row| row[joint] = read);
         let named = match explain(&data, &options()).unwrap().decision {
             Decision::Named(named) => Some(named.correction[0].hypothesis),
             _ => None,
@@ -359,15 +359,22 @@ fn locked(value: f64) -> Vec<(u64, Option<Hypothesis>)> {
 /// A locked joint without a column is no error: what a reading of its own in every row explains are nominal errors.
 #[test]
 fn a_joint_that_stood_at_zero_needs_no_column() {
-    let found = locked(0.0);
+    let found = locked(0.0, None);
     // Power: were one of ten named, none of 24 would pass with probability 8 %.
     assert!(found.iter().all(|f| f.1.is_none()), "{found:?}");
 }
 
 #[test]
 fn a_joint_that_stood_elsewhere_is_named_with_its_place() {
-    for value in [-1.2, 0.5, 1.57] {
-        let found = locked(value);
+    for (value, read) in [
+        (-1.2, None),
+        (0.5, None),
+        (1.57, None),
+        // A column of zeros, or a place that the profile states and the robot was not at.
+        (0.5, Some(0.0)),
+        (-0.8, Some(0.4)),
+    ] {
+        let found = locked(value, read);
         let right = |h: &Hypothesis| match h {
             Hypothesis::StoodAt { value: at, .. } => (at - value).abs() < 0.15,
             _ => false,
@@ -375,11 +382,21 @@ fn a_joint_that_stood_elsewhere_is_named_with_its_place() {
         let named = found.iter().filter_map(|f| f.1.as_ref());
         assert!(
             named.clone().filter(|h| right(h)).count() >= 18,
-            "{found:?}"
+            "{value}, {read:?}: {found:?}"
         );
         // Never that it moved.
         let moved = |h: &Hypothesis| matches!(h, Hypothesis::MissingColumn { .. });
         assert!(!named.clone().any(moved), "{found:?}");
+    }
+}
+
+/// What is stated is true: nothing is named, wherever the joint stood.
+#[test]
+fn a_joint_that_stood_where_it_was_read_is_not_named() {
+    for value in [0.0, 0.5, -1.2] {
+        let found = locked(value, Some(value));
+        // Power: were one of ten named, none of 24 would pass with probability 8 %.
+        assert!(found.iter().all(|f| f.1.is_none()), "{value}: {found:?}");
     }
 }
 
