@@ -4,7 +4,7 @@ use nalgebra::Point3;
 
 use super::data::{Body, Data, Measured};
 use super::hypothesis::{Hypothesis, Scope, Scoped};
-use super::ids::{BodyIndex, RecordingIndex};
+use super::ids::{BodyIndex, JointIndex, RecordingIndex};
 
 /// The data as they would be had the mistake not been made. Hypotheses that estimate something of their own
 /// ([`Hypothesis::TrackerMoved`], [`Hypothesis::MissingColumn`]) change nothing here.
@@ -28,7 +28,7 @@ pub(crate) fn correct(scoped: &Scoped, data: &Data) -> Data {
         Hypothesis::Lag { recording, seconds } => later(&mut corrected, recording, seconds),
         Hypothesis::StoodAt { joint, value } => {
             // Where every row has a reading, it is the readings that are wrong.
-            let empty = super::special::empty_rows(scoped.scope, joint, data);
+            let empty = empty_rows(scoped.scope, joint, data);
             let rows = corrected.readings.iter_mut().zip(&inside);
             for (row, _) in rows.filter(|(_, inside)| **inside) {
                 match empty.is_empty() {
@@ -43,6 +43,13 @@ pub(crate) fn correct(scoped: &Scoped, data: &Data) -> Data {
         }
     }
     corrected
+}
+
+/// Rows in the scope without a reading of the joint.
+pub(crate) fn empty_rows(scope: Scope, joint: JointIndex, data: &Data) -> Vec<usize> {
+    let rows = 0..data.readings.len();
+    rows.filter(|&i| scope.contains(data.recording[i]) && data.readings[i][joint.0].is_none())
+        .collect()
 }
 
 fn correct_readings(data: &mut Data, h: &Hypothesis, inside: &[bool]) {

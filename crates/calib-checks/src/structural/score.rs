@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::candidates::Candidate;
-use super::correct::correct;
+use super::correct::{correct, empty_rows};
 use super::data::Data;
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::JointIndex;
@@ -51,7 +51,7 @@ fn estimated(scan: &Scan<'_>, hypothesis: &Hypothesis, scope: Scope) -> Scored {
         scope,
     };
     if let Hypothesis::MissingColumn { joint } = *hypothesis
-        && special::empty_rows(scope, joint, scan.data).is_empty()
+        && empty_rows(scope, joint, scan.data).is_empty()
     {
         return stood_elsewhere(scan, scoped, joint);
     }
@@ -68,7 +68,7 @@ fn estimated(scan: &Scan<'_>, hypothesis: &Hypothesis, scope: Scope) -> Scored {
 /// A joint without a column moved, or it stood still elsewhere than at 0. A reading of its own in every row takes up nominal
 /// errors, as a frame of its own does: where the joint hardly moved it must gain as much.
 fn empty_column(scan: &Scan<'_>, scoped: Scoped, joint: JointIndex, filled: &Data) -> Scored {
-    let rows = special::empty_rows(scoped.scope, joint, scan.data).len();
+    let rows = empty_rows(scoped.scope, joint, scan.data).len();
     let mut score = penalized(scan, rows, scan.fit_corrected(filled).score);
     let Some(found) = special::whereabouts(scoped.scope, joint, scan.data, filled) else {
         return Scored { scoped, score };

@@ -5,6 +5,7 @@ use calib_geometry::so3;
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector3};
 
 use super::chain::{Motion, Walk};
+use super::correct::empty_rows;
 use super::data::{Data, Measured};
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{JointIndex, LinkIndex, SampleIndex};
@@ -205,13 +206,6 @@ pub(crate) fn range(data: &Data, joint: JointIndex) -> f64 {
         Some(Motion::Prismatic(_)) => STROKE,
         _ => std::f64::consts::PI,
     }
-}
-
-/// Rows in the scope without a reading of the joint.
-pub(crate) fn empty_rows(scope: Scope, joint: JointIndex, data: &Data) -> Vec<usize> {
-    let rows = 0..data.readings.len();
-    rows.filter(|&i| scope.contains(data.recording[i]) && data.readings[i][joint.0].is_none())
-        .collect()
 }
 
 fn missing_column(scope: Scope, joint: JointIndex, data: &Data) -> Data {
