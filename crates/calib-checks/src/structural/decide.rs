@@ -18,6 +18,7 @@ use super::ranking::{Ranking, distinct, few_samples, ratio};
 use super::readings::{WrongReadings, wrong_readings};
 use super::scan::{Scan, Score, Scored};
 use super::screen::{Screened, screen};
+use super::swept::moved_after_all;
 use super::thinning::thinned;
 use super::twin::twin;
 
@@ -146,7 +147,10 @@ fn decided(asked: &Asked<'_>, outcome: &mut Outcome) -> Correction {
     if options.list_invisible {
         outcome.invisible = invisible(data, ranking, screened, options);
     }
-    outcome.decision = decide(asked, outcome);
+    outcome.decision = match decide(asked, outcome) {
+        Decision::Named(named) => Decision::Named(moved_after_all(named, data, screened)),
+        other => other,
+    };
     match &outcome.decision {
         Decision::Named(named)
         | Decision::Undecided {

@@ -77,6 +77,7 @@ mod scan;
 mod score;
 mod screen;
 mod special;
+mod swept;
 mod tested;
 mod thinning;
 mod twin;

@@ -132,7 +132,7 @@ fn stood_at(scan: &Scan<'_>, scoped: Scoped, joint: JointIndex, middle: f64) -> 
 }
 
 /// One estimated reading per row: the degrees of freedom that are left are fewer.
-fn penalized(scan: &Scan<'_>, rows: usize, score: Score) -> Score {
+pub(super) fn penalized(scan: &Scan<'_>, rows: usize, score: Score) -> Score {
     let (_, freedom) = scan.freedom();
     let left = (freedom - rows as f64) / freedom.max(1.0);
     let factor = if left > 0.1 {

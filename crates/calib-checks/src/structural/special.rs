@@ -216,6 +216,29 @@ fn missing_column(scope: Scope, joint: JointIndex, data: &Data) -> Data {
     estimated(filled, joint, &rows, &[]).0
 }
 
+/// The data with the position of a joint in these rows taken from the tracker, beginning at the registration of the rows that are
+/// not `screened`: the others are those where it moved.
+pub(super) fn estimated_beside(
+    mut filled: Data,
+    joint: JointIndex,
+    rows: &[usize],
+    screened: &[SampleIndex],
+) -> Data {
+    let links: Vec<LinkIndex> = filled.bodies.iter().map(|b| b.link).collect();
+    let mut walk = Walk::new(&filled.chain, &links);
+    let range = range(&filled, joint);
+    let found: Vec<f64> = {
+        let fit = Scan::new(&filled, screened).fit(None);
+        let scan = Scan::new(&filled, &[]);
+        let of_row = |i: &usize| best_reading(&scan, &fit, &mut walk, *i, joint, range);
+        rows.iter().map(of_row).collect()
+    };
+    for (&i, q) in rows.iter().zip(found) {
+        filled.readings[i][joint.0] = Some(q);
+    }
+    estimated(filled, joint, rows, &[]).0
+}
+
 /// The data with the position of a joint in these rows taken from the tracker, and the residual of the registration, rms, m.
 pub(super) fn estimated(
     mut filled: Data,

@@ -390,6 +390,39 @@ fn a_joint_that_stood_elsewhere_is_named_with_its_place() {
     }
 }
 
+/// It stood in most rows and was swept in some, as in a sweep of each joint: it moved, and no place is stated for all rows.
+#[test]
+fn a_joint_without_a_column_that_was_swept_in_some_rows_moved() {
+    let (mut moved, mut stood) = (0, 0);
+    for seed in 0..16_u64 {
+        let body = [BodyKind::Markers(3), BodyKind::Pose][seed as usize % 2];
+        let mut setting = Setting::new(33_000 + seed, Plan::Poses(40), body, SMALL);
+        let joints = setting.nominal.joints();
+        let revolute = |j: &usize| matches!(joints[*j].motion, Motion::Revolute(_));
+        let joint = (1..joints.len() - 1).find(revolute).expect("one of two");
+        for (row, q) in setting.readings.iter_mut().enumerate() {
+            q[joint] = match row {
+                // From −1.2 to 1.2 rad in nine rows.
+                12..21 => 0.3 * (row as f64 - 16.0),
+                _ => 0.3,
+            };
+        }
+        let mut data = setting.data(true);
+        data.readings.iter_mut().for_each(|row| row[joint] = None);
+        if let Decision::Named(named) = explain(&data, &options()).unwrap().decision {
+            moved += usize::from(matches!(
+                named.correction[0].hypothesis,
+                Hypothesis::MissingColumn { .. }
+            ));
+            stood += usize::from(matches!(
+                named.correction[0].hypothesis,
+                Hypothesis::StoodAt { .. }
+            ));
+        }
+    }
+    assert!(moved >= 12 && stood == 0, "{moved}, {stood}");
+}
+
 /// What is stated is true: nothing is named, wherever the joint stood.
 #[test]
 fn a_joint_that_stood_where_it_was_read_is_not_named() {

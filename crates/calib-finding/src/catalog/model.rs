@@ -148,10 +148,10 @@ super::topic! {
             "The recordings fit the nominal robot to {none} rms, where nominal errors explain {limit}. Without the readings of joint `{joint}`[[ in {recordings:code}]], its position taken from the tracker instead, {best} rms remain[[ ({next} without those of another joint)]]. In {off} of {rows:row} they are off by more than {least}, in half of them by more than {median}.[[ What belongs to a row stands {earlier:row} earlier in this column.]][[ What belongs to a row stands {later:row} later in this column.]]",
             "Look at the column of this joint: values that are sorted, smoothed, stuck or shifted against the other columns, or those of another joint.";
         "undecided": Error,
-            "The recordings fit the nominal robot to {none} rms, where nominal errors explain {limit}; no single mistake and no pair explains it[[; the best attempt, {leading:code}, leaves {best}]].[[ Without {recordings:code} the others fit to {rest}.]]",
+            "The recordings fit the nominal robot to {none} rms, where nominal errors explain {limit}; no single mistake and no pair explains it[[; the best attempt, {leading:code}, leaves {best}]].[[ Without {recordings:code} the others fit to {rest}.]][[ Joints without a column were taken to stand at 0, and nothing fits where one of them moved: {assumed:code}.]]",
             "Check that URDF and robot are the same model, the links of the bodies, and that joints and tracker recorded the same motion.";
         "large": Warning,
-            "The recordings fit the nominal robot to {none} rms, where nominal errors explain {limit}; no single mistake explains it.",
+            "The recordings fit the nominal robot to {none} rms, where nominal errors explain {limit}; no single mistake explains it.[[ Joints without a column were taken to stand at 0, and nothing fits where one of them moved: {assumed:code}.]]",
             "Check the URDF against a drawing, and validate with separate poses.";
         "range": Warning,
             "Most rows with joint `{joint}` between {low} and {high} disagree with the nominal robot: {count} of {rows:row}.",

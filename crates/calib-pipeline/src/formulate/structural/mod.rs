@@ -13,10 +13,10 @@ mod merge;
 mod named;
 mod without;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_checks::structural::{
-    Chain, Decision, Options, Outcome, RecordingIndex, Scope, WrongReadings, explain,
+    Chain, Decision, JointIndex, Options, Outcome, RecordingIndex, Scope, WrongReadings, explain,
     registration_residual, thin,
 };
 use calib_finding::{Fact, Finding, Severity, Subject, catalog};
@@ -194,9 +194,16 @@ fn decision(layout: &Layout<'_>, outcome: &Outcome) -> Vec<Finding> {
                 recordings,
                 ..Subject::default()
             };
+            let assumed: BTreeSet<JointIndex> = outcome.assumed_zero.iter().map(|a| a.0).collect();
+            let assumed = assumed.iter().map(|joint| layout.joint(*joint).to_owned());
+            let assumed: Vec<String> = assumed.collect();
             let finding = Finding::of_kind(catalog::MODEL_DISAGREES, kind, subject)
                 .with("none", Fact::meters(outcome.rms))
-                .with_some("limit", limit.map(Fact::meters));
+                .with_some("limit", limit.map(Fact::meters))
+                .with_some(
+                    "assumed",
+                    (!assumed.is_empty()).then(|| Fact::names(assumed)),
+                );
             let finding = match apart {
                 Some(apart) => apart.noted(layout, finding),
                 None => finding,
