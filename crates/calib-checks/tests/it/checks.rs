@@ -164,6 +164,7 @@ pub fn record(seed: u64, timed: bool) -> Recorded {
         reach: Some(0.9),
         min_poses: 12,
         marker_sigma: Some(SIGMA),
+        ..Expectations::default()
     };
     Recorded { poses, expected, q }
 }
