@@ -61,7 +61,7 @@ fn of_template(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
     found
 }
 
-fn place<'a>(expected: &'a mut Expectations, marker: usize) -> &'a mut Point3<f64> {
+fn place(expected: &mut Expectations, marker: usize) -> &mut Point3<f64> {
     let template = expected.templates.get_mut("body").expect("stated");
     &mut template.points[marker]
 }
