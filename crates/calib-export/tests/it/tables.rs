@@ -204,7 +204,7 @@ fn corrected(named: Option<&str>) {
 
 /// A body that is called as a link is: its poses are its own, under the name of the scene, and that is said.
 #[test]
-fn a_body_with_the_name_of_a_link_is_told_apart() {
+fn a_body_with_the_name_of_a_link_is_distinguished() {
     let folder = tempfile::tempdir().expect("a folder");
     let path = table(&folder, "shoulder_deg,elbow_deg\n10,20\n-40,35\n");
     let options = PredictOptions::default();
