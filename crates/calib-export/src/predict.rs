@@ -45,6 +45,8 @@ pub struct Predicted {
     pub absent: Vec<String>,
     /// Temperature that was assumed, °C, because the table has none and lengths follow it.
     pub assumed_temperature_c: Option<f64>,
+    /// Names that were asked for, or would have been given, that a link and a body or point have: the link's, and the other's here.
+    pub renamed: Vec<(String, String)>,
 }
 
 /// Predicts the poses of a table of joint positions.
@@ -74,6 +76,7 @@ pub fn predict(
         outside: 0,
         absent: program.absent.clone(),
         assumed_temperature_c: program.assumed_temperature_c(&robot.model),
+        renamed: renamed(robot, &places),
     };
     let mut rows = Rows {
         robot,
@@ -114,6 +117,14 @@ fn places(robot: &Robot, of: &[String]) -> Result<Vec<(String, Place)>, ExportEr
         .into_iter()
         .map(|name| robot.place(&name).map(|place| (name, place)))
         .collect()
+}
+
+/// Of the names that a link and a body or point have, those that say what a column is.
+fn renamed(robot: &Robot, places: &[(String, Place)]) -> Vec<(String, String)> {
+    let given = |name: &String| places.iter().any(|(place, _)| place == name);
+    let renamed = robot.model.renamed().iter();
+    let said = renamed.filter(|(link, own)| given(link) || given(own));
+    said.cloned().collect()
 }
 
 /// Endings of the columns of a pose and of its σ: the axes of the frame that it is given in.

@@ -101,7 +101,10 @@ impl Robot {
     /// What is in the way.
     pub(crate) fn with_link(&self, point: &str) -> Result<(Self, LinkId), String> {
         let mut file = self.file.clone();
-        let Some(at) = file.points.get(point).cloned() else {
+        let mut renamed = self.model.renamed().iter();
+        let own = renamed.find(|(_, name)| name == point);
+        let own = own.map_or(point, |(own, _)| own.as_str());
+        let Some(at) = file.points.get(own).cloned() else {
             return Err(format!("it has no point {point}"));
         };
         let joint = format!("{point}_fixed");

@@ -171,6 +171,8 @@ pub struct Model {
     pub(crate) tracker_from_root: Pose,
     pub(crate) bodies: Vec<Fixed>,
     pub(crate) points: Vec<Fixed>,
+    /// Bodies and points that a link's name was taken from: in the file, here.
+    pub(crate) renamed: Vec<(String, String)>,
     /// By link: the joints that lead to it, root first.
     pub(crate) chains: Vec<Vec<usize>>,
     /// By link: the entries of q of the joints that lead to it, in ascending order.
@@ -227,7 +229,14 @@ impl Model {
         })
     }
 
-    /// A link, body or point by its name; `None` where there is none. Links come first.
+    /// Bodies and points that the file calls as a link is called: their names there, and here (`_body` behind it, as in the scene).
+    #[must_use]
+    pub fn renamed(&self) -> &[(String, String)] {
+        &self.renamed
+    }
+
+    /// A link, body or point by its name; `None` where there is none. No body or point has the name of a link
+    /// ([`Model::renamed`]).
     #[must_use]
     pub fn place(&self, name: &str) -> Option<Place> {
         let of = |fixed: &[Fixed]| fixed.iter().position(|f| f.name == name);

@@ -96,6 +96,18 @@ const WRONG: &[(&str, &str, &str, &str)] = &[
     ),
     ("calib: 1", "calib: 2", "arm.yaml:1:8", "version 2"),
     (
+        "frame: world",
+        "frame: base",
+        "arm.yaml:3:",
+        "the name of a link of the URDF",
+    ),
+    (
+        "frame: world",
+        "frame: hand",
+        "arm.yaml:3:",
+        "the name of a body",
+    ),
+    (
         "link: tip",
         "link: tup",
         "arm.yaml:5:16",

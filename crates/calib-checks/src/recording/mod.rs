@@ -26,6 +26,8 @@ pub struct Expectations {
     pub bodies: BTreeMap<String, Vec<String>>,
     /// Body → where its markers sit, m, when known beforehand (a drawing, an earlier calibration).
     pub templates: BTreeMap<String, Template>,
+    /// Body → σ of a coordinate of its template, m, where it is known.
+    pub template_sigmas: BTreeMap<String, f64>,
     /// Joint → limits from the URDF, rad or m.
     pub limits: BTreeMap<String, (f64, f64)>,
     /// Joint → range of motion that the sweep asks for, rad or m. These joints must move.

@@ -12,8 +12,11 @@ const UNIT: f64 = 1e-6;
 const FLIP: f64 = 1.75;
 /// … it is this many times the usual turn between rows.
 const FLIP_RATIO: f64 = 4.0;
-/// … and the body's origin moves less than this many times its usual step.
-const FLIP_STEP_RATIO: f64 = 4.0;
+/// … and the body's origin stays within a marker pattern, m, beyond what the joints carry it. a rotation of 100° about an axis that is
+/// 65 mm or more away from the body carries it farther.
+const PATTERN: f64 = 0.1;
+/// Where no joint is recorded: a body moves by up to this many times its usual step between rows.
+const STEP_RATIO: f64 = 4.0;
 /// Second difference of a smooth track: this many times its median …
 const JUMP_RATIO: f64 = 40.0;
 /// … and at least this, m, is a jump.
@@ -55,57 +58,89 @@ fn together(poses: &Poses, a: usize, b: usize) -> bool {
     names.is_none_or(|names| names.get(a) == names.get(b))
 }
 
+/// What a body and the joints did between neighboring rows.
+struct Between {
+    /// Index of the later row.
+    row: usize,
+    /// Turn of the body beyond what the joints turned, rad.
+    turn: f64,
+    /// Way of the body's origin, m.
+    step: f64,
+    /// What the joints turned, rad.
+    turned: f64,
+    /// What the joints slid, m.
+    slid: f64,
+}
+
 /// A body that turns by half a turn or so on the spot: its marker pattern is nearly symmetric.
+///
+/// A body that moves away while it turns was carried by the robot, whatever the joints are said to have done: a logger that hung, a
+/// column that is missing. Where most of the sudden turns are of this kind, so are the few that end near their start by chance.
 pub(super) fn flips(poses: &Poses) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (name, track) in &poses.bodies {
         let seen: Vec<usize> = (0..track.len()).filter(|&i| track[i].is_some()).collect();
-        let step = |w: &[usize]| Some((w[0], w[1], track[w[0]]?, track[w[1]]?));
-        let steps: Vec<(usize, f64, f64)> = seen
+        let between = |w: &[usize]| {
+            let (before, row) = (w[0], w[1]);
+            let (a, b) = (track[before]?, track[row]?);
+            let (turned, slid) = joints_moved(poses, before, row);
+            Some(Between {
+                row,
+                // What the joints turned between the rows needs no flip (a sweep that starts its next line).
+                turn: (a.rotation.angle_to(&b.rotation) - turned).max(0.0),
+                step: (a.translation.vector - b.translation.vector).norm(),
+                turned,
+                slid,
+            })
+        };
+        let steps: Vec<Between> = seen
             .windows(2)
             .filter(|w| together(poses, w[0], w[1]))
-            .filter_map(step)
-            .map(|(before, row, a, b)| {
-                // What the joints turned between the rows needs no flip (a sweep that starts its next line).
-                let turned = joints_turned(poses, before, row);
-                (
-                    row,
-                    (a.rotation.angle_to(&b.rotation) - turned).max(0.0),
-                    (a.translation.vector - b.translation.vector).norm(),
-                )
-            })
+            .filter_map(between)
             .collect();
-        let usual_turn = median(steps.iter().map(|s| s.1).collect()).unwrap_or(0.0);
-        let usual_step = median(steps.iter().map(|s| s.2).collect()).unwrap_or(0.0);
-        let flips: Vec<u64> = steps
+        let usual_turn = median(steps.iter().map(|s| s.turn).collect()).unwrap_or(0.0);
+        let carried = carried(poses, &steps);
+        let (on_the_spot, away): (Vec<&Between>, Vec<&Between>) = steps
             .iter()
-            .filter(|(_, turn, step)| {
-                *turn > FLIP
-                    && *turn > FLIP_RATIO * usual_turn
-                    && *step < FLIP_STEP_RATIO * usual_step + 0.02
-            })
-            .map(|(row, _, _)| poses.rows[*row])
-            .collect();
-        if !flips.is_empty() {
+            .filter(|s| s.turn > FLIP && s.turn > FLIP_RATIO * usual_turn)
+            .partition(|s| s.step < PATTERN + carried(s));
+        if on_the_spot.len() > away.len() {
             findings.push(
                 Finding::of_kind(catalog::BODY_FLIP, "rows", Subject::body(name))
                     .with("limit", Fact::radians(FLIP))
-                    .with("count", Fact::count(flips.len()))
+                    .with("count", Fact::count(on_the_spot.len()))
                     .with("usual", Fact::radians(usual_turn))
-                    .at_rows(flips),
+                    .at_rows(on_the_spot.iter().map(|s| poses.rows[s.row])),
             );
         }
     }
     findings
 }
 
-/// Sum of what the recorded joints turned between two rows, rad: the most that a body on the robot can turn.
-fn joints_turned(poses: &Poses, before: usize, after: usize) -> f64 {
-    let turned = poses.joints.iter().filter_map(|(name, q)| {
-        let is_angle = poses.joint_units.get(name) != Some(&JointUnit::Length);
-        Some((q[after]? - q[before]?).abs()).filter(|_| is_angle)
-    });
-    turned.sum()
+/// How far the joints carry a body's origin between two rows, m: as far for a turn as they usually do.
+fn carried(poses: &Poses, steps: &[Between]) -> impl Fn(&Between) -> f64 + use<> {
+    let usual_step = median(steps.iter().map(|s| s.step).collect()).unwrap_or(0.0);
+    let without_joints = poses.joints.is_empty().then_some(STEP_RATIO * usual_step);
+    let radii = steps.iter().filter(|s| s.turned > 0.0);
+    let radii = radii.map(|s| (s.step - s.slid).max(0.0) / s.turned);
+    let radius = median(radii.collect()).unwrap_or(0.0);
+    move |s| without_joints.unwrap_or(radius * s.turned + s.slid)
+}
+
+/// Sums of what the recorded joints turned, rad, and slid, m, between two rows: the most that a body on the robot can turn and slide.
+fn joints_moved(poses: &Poses, before: usize, after: usize) -> (f64, f64) {
+    let (mut turned, mut slid) = (0.0, 0.0);
+    for (name, q) in &poses.joints {
+        let (Some(a), Some(b)) = (q[before], q[after]) else {
+            continue;
+        };
+        if poses.joint_units.get(name) == Some(&JointUnit::Length) {
+            slid += (b - a).abs();
+        } else {
+            turned += (b - a).abs();
+        }
+    }
+    (turned, slid)
 }
 
 /// The largest second difference of a point that the joints' readings of three rows explain, m.

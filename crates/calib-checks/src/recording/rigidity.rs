@@ -3,6 +3,7 @@
 //! Everything is read from the distances `d_ij` between markers, which no motion changes.
 
 mod rows;
+mod template;
 
 use super::Expectations;
 use crate::rigid_body::Template;
@@ -70,7 +71,9 @@ pub(super) fn rigidity(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
             continue;
         };
         if let Some(template) = expected.templates.get(name) {
-            findings.extend(body.against_template(template));
+            let sigma = expected.template_sigmas.get(name).copied();
+            let off = || body.off_template(template, sigma, expected.marker_sigma);
+            findings.extend(body.against_template(template, sigma).or_else(off));
         }
         if let Some(finding) = body.redefined(poses) {
             findings.push(finding);
@@ -328,8 +331,8 @@ impl<'a> Body<'a> {
         sigmas.get(middle).copied().unwrap_or(0.0)
     }
 
-    /// Scale and handedness against a template that is known beforehand.
-    fn against_template(&self, template: &Template) -> Option<Finding> {
+    /// Scale and handedness against a template that is known beforehand; `sigma`: of its coordinates, m, where it is stated.
+    fn against_template(&self, template: &Template, sigma: Option<f64>) -> Option<Finding> {
         let place = |k: usize| {
             let at = template
                 .names
@@ -360,7 +363,8 @@ impl<'a> Body<'a> {
                 Some((pair.distance - (place(pair.i)? - place(pair.j)?).norm()).abs())
             })
             .fold(0.0, f64::max);
-        if off > self.tolerance.max(2e-3) {
+        let uncertain = SIGMAS * std::f64::consts::SQRT_2 * sigma.unwrap_or(0.0);
+        if off > self.tolerance.max(2e-3).max(uncertain) {
             return Some(
                 self.finding_of(catalog::NOT_RIGID, "template")
                     .with("difference", Fact::meters(off)),

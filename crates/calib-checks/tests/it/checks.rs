@@ -164,6 +164,7 @@ pub fn record(seed: u64, timed: bool) -> Recorded {
         reach: Some(0.9),
         min_poses: 12,
         marker_sigma: Some(SIGMA),
+        ..Expectations::default()
     };
     Recorded { poses, expected, q }
 }
@@ -602,6 +603,85 @@ fn spoiled_rows_are_exactly_those() {
         let flips = [(2, true), (17, true), (18, true)];
         assert_eq!(rows(&flipped, &clean), flips, "seed {seed}");
         assert!(disagreement(track, &clean).expect("turned") < 0.005);
+    }
+}
+
+/// Random poses of the arm whose joint readings `spoil` changes, as a track of `tool`.
+fn flips_beside(seed: u64, spoil: impl Fn(&mut Poses)) -> Vec<Finding> {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let mut recorded = record(seed, false);
+    let tool = Isometry3::translation(0.02, 0.03, 0.04);
+    for row in 0..recorded.poses.len() {
+        let q = [2.0, 1.4, 2.8].map(|range| rng.random_range(-range..range));
+        for (joint, q) in JOINTS.iter().zip(q) {
+            let readings = recorded.poses.joints.get_mut(*joint).expect("recorded");
+            readings[row] = Some(q);
+        }
+        let track = recorded.poses.bodies.get_mut("tool").expect("recorded");
+        track[row] = Some(forward(q) * tool);
+    }
+    spoil(&mut recorded.poses);
+    let mut found = checks(&recorded.poses, &recorded.expected);
+    found.retain(|f| f.id == catalog::BODY_FLIP);
+    found
+}
+
+/// The joints' logger hangs while the robot goes on: the body turns, but not on the spot.
+#[test]
+fn a_logger_that_hangs_is_no_flip() {
+    for seed in 0..200 {
+        let hung = flips_beside(7000 + seed, |poses| {
+            let at = 3 + seed as usize % 25;
+            for readings in poses.joints.values_mut() {
+                let last = readings[at];
+                readings[at..at + 5].fill(last);
+            }
+        });
+        assert!(hung.is_empty(), "{seed}: {hung:?}");
+    }
+}
+
+/// Rows off by one, a column that is missing: joints that are said to have moved otherwise than they did. Once in a few hundred
+/// recordings a single turn ends where it began.
+#[test]
+fn wrong_readings_are_no_flips() {
+    let mut found = Vec::new();
+    for seed in 0..200 {
+        found.extend(flips_beside(7300 + seed, |poses| {
+            for readings in poses.joints.values_mut() {
+                readings.rotate_right(1);
+            }
+        }));
+        for joint in ["waist", "shoulder"] {
+            found.extend(flips_beside(7600 + seed, |poses| {
+                poses.joints.remove(joint);
+            }));
+        }
+    }
+    assert!(found.len() <= 2, "{found:?}");
+}
+
+/// A robot that stands while its body flips: for one row, or from one row on; the body's origin is anywhere on the pattern.
+#[test]
+fn flips_of_a_standing_robot_are_found() {
+    for seed in 0..100 {
+        let at = 4 + seed as usize % 20;
+        let found = flips_beside(8000 + seed, |poses| {
+            for readings in poses.joints.values_mut() {
+                let stands = readings[at];
+                readings[at..at + 4].fill(stands);
+            }
+            let axis = Isometry3::translation(0.03, 0.02, 0.0);
+            let half = Isometry3::rotation(Vector3::z() * std::f64::consts::PI);
+            let flip = axis * half * axis.inverse();
+            let track = poses.bodies.get_mut("tool").expect("recorded");
+            let stands = track[at];
+            track[at..at + 4].fill(stands);
+            track[at + 2] = stands.map(|pose| pose * flip);
+        });
+        let rows: Vec<&[u64]> = found.iter().map(|f| f.rows.as_slice()).collect();
+        let row = at as u64 + 2;
+        assert_eq!(rows, [[row + 2, row + 3]], "{seed}");
     }
 }
 

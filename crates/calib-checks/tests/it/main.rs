@@ -9,3 +9,4 @@ mod recall;
 mod robots;
 mod structural;
 mod sync;
+mod templates;

@@ -64,6 +64,11 @@ pub fn run(console: &Console, options: &Predict) -> Result<ExitCode, CliError> {
     if !console.quiet {
         say_absent(&done.absent);
         say_assumed(done.assumed_temperature_c);
+        for (link, own) in &done.renamed {
+            say(&format!(
+                "calib: `{link}` is the link; the body or point of the same name is `{own}`, as in the scene"
+            ));
+        }
         if done.outside > 0 {
             say(&format!(
                 "calib: {} of {} rows are outside of the range that was fitted: nothing was verified there",

@@ -201,3 +201,36 @@ fn corrected(named: Option<&str>) {
     let done = correct(&robot, &table(&folder, &text), &options).expect("corrected");
     assert!(done.cartesian && done.reached >= 17, "{done:?}");
 }
+
+/// A body that is called as a link is: its poses are its own, under the name of the scene, and that is said.
+#[test]
+fn a_body_with_the_name_of_a_link_is_distinguished() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = table(&folder, "shoulder_deg,elbow_deg\n10,20\n-40,35\n");
+    let options = PredictOptions::default();
+    let own = predict(&arm(), &path, &options).expect("predicted");
+    assert!(own.renamed.is_empty());
+    let renamed = ARM.replace("\"marker_plate\"", "\"tool\"");
+    // The link keeps its name.
+    let robot = Robot::from_json(renamed.as_bytes()).expect("a model");
+    let done = predict(&robot, &path, &options).expect("predicted");
+    assert_eq!(done.renamed, [("tool".to_owned(), "tool_body".to_owned())]);
+    assert_eq!(done.csv.replace("tool_body.", "marker_plate."), own.csv);
+    let of = |name: &str| {
+        let of = vec![name.to_owned()];
+        predict(
+            &robot,
+            &path,
+            &PredictOptions {
+                of,
+                ..options.clone()
+            },
+        )
+        .expect("predicted")
+    };
+    let (link, body) = (of("tool"), of("tool_body"));
+    assert_eq!((link.renamed.len(), body.renamed.len()), (1, 1));
+    let body = body.csv.replace("tool_body.", "tool.");
+    assert!(link.csv != body, "the body is not where the link is");
+    assert_eq!(of("upper").renamed, []);
+}

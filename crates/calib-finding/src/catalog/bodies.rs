@@ -30,6 +30,12 @@ super::topic! {
         "template": Error,
             "The body differs from its template by up to {difference} in a distance.",
             "Check the order of the markers, or remove the template so that it is learned from the recording.";
+        "template_marker": Warning,
+            "Marker `{marker}` is not where the template has it: only its mean distances differ from the template's, by up to {difference}.",
+            "Measure the marker's place on the body again, or remove the template so that it is learned from the recording.";
+        "template_distance": Warning,
+            "The mean distance between `{first}` and `{second}` differs from that in the template by {difference}. No single marker explains it.",
+            "Measure the markers' places on the body again, or remove the template so that it is learned from the recording.";
     }
     /// Markers exchanged in some rows.
     MARKER_SWAP = "marker-swap" {

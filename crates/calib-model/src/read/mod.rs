@@ -114,6 +114,7 @@ impl Model {
             tracker_from_root: pose("tracker_from_root", &file.tracker_from_root)?,
             bodies: Vec::new(),
             points: Vec::new(),
+            renamed: Vec::new(),
             chains: vec![Vec::new()],
             leading: Vec::new(),
             movers: Vec::new(),
@@ -126,7 +127,25 @@ impl Model {
         model.add_fixed(file, &names)?;
         model.add_movers();
         model.add_uncertainty(file, &names)?;
+        model.tell_apart();
         Ok(model)
+    }
+
+    /// A body or point with the name of a link gets another one, as in the scene: a pose under that name is the link's.
+    fn tell_apart(&mut self) {
+        let fixed = self.bodies.iter().chain(&self.points);
+        let mut taken: BTreeSet<String> = fixed.map(|f| f.name.clone()).collect();
+        taken.extend(self.links.iter().cloned());
+        for fixed in self.bodies.iter_mut().chain(&mut self.points) {
+            if self.links.contains(&fixed.name) {
+                let mut name = format!("{}_body", fixed.name);
+                while !taken.insert(name.clone()) {
+                    name.push_str("_body");
+                }
+                let own = std::mem::replace(&mut fixed.name, name.clone());
+                self.renamed.push((own, name));
+            }
+        }
     }
 
     fn add_joints(

@@ -207,6 +207,11 @@ fn expectations(inputs: &Inputs, loaded: &Loaded) -> Expectations {
     Expectations {
         bodies,
         templates,
+        template_sigmas: profile
+            .bodies
+            .iter()
+            .filter_map(|(body, spec)| Some((body.clone(), spec.template_sigma?)))
+            .collect(),
         limits: model
             .joint_ids()
             // The reading of a coupled joint is not its position.

@@ -4,7 +4,7 @@
 use calib_core::{
     ChanceOfChanges, Change, ChangeScan, Contest, GoodnessOfFit, Moved, ScoreTest, Suspect,
 };
-use calib_finding::Finding;
+use calib_finding::{Fact, Finding, catalog};
 
 use super::elimination::{Asked, Held, eliminated};
 use crate::formulate::formulation::MlFit;
@@ -104,6 +104,13 @@ pub fn causes(
     let mut causes = those_that_hold(inputs, fit, &open, scan, beside.goodness);
     causes.scatter = beside.finding.or(of_scan).filter(|_| steady);
     causes.explained.extend(beside.explained);
+    // Lengths that disagree with a wrong template say nothing of the tracker's scale.
+    let off_template = before
+        .iter()
+        .any(|f| f.id == catalog::NOT_RIGID && is_kind(f, "template"));
+    causes.change = causes
+        .change
+        .filter(|f| !(off_template && is_kind(f, "scale")));
     if let Some(change) = &causes.changed {
         let rows = changes::rows_of(inputs, fit, change, before);
         causes.explained.extend(rows);
@@ -111,6 +118,12 @@ pub fn causes(
         causes.explained.extend(memory.cloned());
     }
     causes
+}
+
+/// Whether the kind of a finding begins so.
+fn is_kind(finding: &Finding, begins: &str) -> bool {
+    let kind = finding.facts.get("kind").and_then(Fact::word);
+    kind.is_some_and(|kind| kind.starts_with(begins))
 }
 
 fn those_that_hold(

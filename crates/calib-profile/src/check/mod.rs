@@ -136,6 +136,7 @@ impl<'a> Checker<'a> {
                 self.positive(&["tracker", key], value);
             }
         }
+        self.tracker_frame();
         Profile {
             robot: raw.robot.name.clone(),
             urdf: raw.robot.urdf.clone(),

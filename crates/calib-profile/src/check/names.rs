@@ -29,6 +29,25 @@ impl MarkerList {
 }
 
 impl Checker<'_> {
+    /// Reports and scenes name frames: that of the tracker has a name of its own.
+    pub(super) fn tracker_frame(&mut self) {
+        let frame = &self.raw.tracker.frame;
+        let other = if self.robot.link_id(frame).is_ok() {
+            "a link of the URDF"
+        } else if self.raw.bodies.contains_key(frame) {
+            "a body"
+        } else if self.raw.points.contains_key(frame) {
+            "a point"
+        } else {
+            return;
+        };
+        self.problem(
+            &["tracker", "frame"],
+            format!("the tracker's frame `{frame}` has the name of {other}"),
+            "give the tracker's frame a name of its own, e.g. `lab`",
+        );
+    }
+
     /// Each key is a body or marker, and no two of them are one of the tracker's.
     pub(super) fn tracker_names(&mut self) -> BTreeMap<String, String> {
         let raw = self.raw;

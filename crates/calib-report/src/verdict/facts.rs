@@ -151,6 +151,20 @@ impl Agreement {
             high: quantile(rows, degrees_of_freedom),
         }
     }
+
+    /// The largest χ² per degree of freedom that is left alone.
+    #[must_use]
+    pub fn accepted(&self) -> f64 {
+        /// No stated σ is more exact than this, as a ratio of variances.
+        const AGREES: f64 = 1.5;
+        self.high.max(AGREES)
+    }
+
+    /// Whether held-out errors are larger than what is stated of them allows.
+    #[must_use]
+    pub fn is_beyond(&self) -> bool {
+        self.value > self.accepted()
+    }
 }
 
 /// 99.9 % quantile of F(h, ν), by the cube root of χ²/dof, which is nearly normal (Wilson & Hilferty; Paulson 1942).

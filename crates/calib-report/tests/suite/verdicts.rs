@@ -305,7 +305,25 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
             ReasonId::WorseThanRegistration,
             Rejects,
             with(|f| {
-                f.improvements = vec![improvement(0.0005, 0.001, 0.99, 0.01)];
+                f.improvements = vec![improvement(0.0005, 0.001, 0.99, 0.001)];
+                f.agreement = Some(Agreement::of(480.0, 120, 60.0));
+            }),
+        ),
+        // A closed form states no uncertainty.
+        (
+            ReasonId::WorseThanRegistration,
+            Rejects,
+            with(|f| {
+                f.improvements = vec![improvement(0.0005, 0.001, 0.99, 0.001)];
+                f.agreement = None;
+            }),
+        ),
+        // Larger errors that the stated uncertainty explains are no reason to reject.
+        (
+            ReasonId::NotBetterThanRegistration,
+            Warns,
+            with(|f| {
+                f.improvements = vec![improvement(0.00025, 0.00029, 1.0, 0.004)];
             }),
         ),
         (
@@ -607,6 +625,23 @@ fn every_rule_speaks_where_it_is_broken_and_decides() {
     for (id, effect) in seen {
         assert!(id.effects().contains(&effect), "{id:?} has no {effect:?}");
     }
+}
+
+/// Once in a hundred cases is not rare enough to reject; what is stated is too small, and that leaves the result open.
+#[test]
+fn errors_beyond_the_stated_ones_that_chance_makes_larger_are_not_decided() {
+    let facts = with(|f| {
+        f.improvements = vec![improvement(0.0005, 0.001, 0.99, 0.01)];
+        f.agreement = Some(Agreement::of(480.0, 120, 60.0));
+    });
+    let judgment = judge(&facts);
+    assert_eq!(judgment.verdict, Verdict::NotEvaluated);
+    let ids: Vec<ReasonId> = judgment.reasons.iter().map(|r| r.id).collect();
+    assert!(ids.contains(&ReasonId::HeldOutBeyondStated), "{ids:?}");
+    assert!(
+        ids.contains(&ReasonId::NotBetterThanRegistration),
+        "{ids:?}"
+    );
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use calib_finding::Fact;
 
 use crate::verdict::facts::{Facts, Validation};
-use crate::verdict::{Compared, Effect, Reason, ReasonId};
+use crate::verdict::{Compared, Effect, Improvement, Reason, ReasonId};
 use crate::{Limit, Outcome, Unit};
 
 /// A limit that lies in the interval of its estimate is neither met nor exceeded, on whichever side of it the estimate lies: more
@@ -65,6 +65,12 @@ pub(super) fn enough(facts: &Facts, limit: &Limit) -> Option<usize> {
 /// Chance makes a robot look better (or worse) so clearly in at most this share of the cases.
 pub(super) const SIGNIFICANT: f64 = 0.05;
 
+/// Chance makes it look worse by so much that the result is rejected in at most this share of the cases, and only where its errors
+/// are also larger than the fit states of them, which a right fit's are once in a thousand validations ([`crate::Agreement`]).
+/// Registration alone absorbs nearly all of a small robot's errors; the calibrated one then differs from it by its own uncertainty, in
+/// all postures at once, and is truly a little worse in half of the cases. Eight postures, all of them worse, are as rare as this.
+const REJECTS: f64 = 0.005;
+
 /// The smallest p of a test that exchanges the signs of so many differences.
 fn least_p(postures: usize) -> f64 {
     0.5_f64.powi(postures.try_into().unwrap_or(i32::MAX))
@@ -74,10 +80,18 @@ pub(super) fn registration(facts: &Facts) -> Vec<Reason> {
     if !facts.freed || facts.improvements.is_empty() {
         return Vec::new();
     }
+    // Without a statement of its uncertainty, the comparison is all there is.
+    let stated = facts.agreement.as_ref();
+    let beyond = stated.is_none_or(crate::Agreement::is_beyond);
+    let rejecting = |i: &&Improvement| beyond && i.p_worse < REJECTS;
+    let rejecting = facts.improvements.iter().find(rejecting);
     let worse = facts.improvements.iter().find(|i| i.p_worse < SIGNIFICANT);
     let better = facts.improvements.iter().any(|i| i.p_better < SIGNIFICANT);
-    let (id, effect, shown) = match (worse, better) {
-        (Some(worse), _) => (ReasonId::WorseThanRegistration, Effect::Rejects, worse),
+    let (id, effect, shown) = match (rejecting.or(worse), better) {
+        (Some(worse), _) if rejecting.is_some() => {
+            (ReasonId::WorseThanRegistration, Effect::Rejects, worse)
+        }
+        (Some(worse), _) => (ReasonId::NotBetterThanRegistration, Effect::Warns, worse),
         (None, true) => return Vec::new(),
         // Of fewer postures the smallest p, all of them better, is larger: nothing could have been significant.
         (None, false)

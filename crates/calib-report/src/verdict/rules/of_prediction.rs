@@ -75,17 +75,13 @@ fn of_effect(reason: Reason, what: &Untested) -> Reason {
         .with_some("other", what.other.as_ref().map(Fact::name))
 }
 
-/// Held-out errors up to this many times their stated variance are left alone: no stated σ is that exact.
-const AGREES: f64 = 1.5;
-
 pub(super) fn agreement(facts: &Facts) -> Vec<Reason> {
-    let beyond = |a: &&crate::Agreement| a.value > a.high.max(AGREES);
     let reason = |a: &crate::Agreement| {
         Reason::new(ReasonId::HeldOutBeyondStated, unless_measured(facts))
             .with("value", Fact::ratio(a.value))
-            .with("high", Fact::ratio(a.high.max(AGREES)))
+            .with("high", Fact::ratio(a.accepted()))
     };
-    let found = facts.agreement.as_ref().filter(beyond);
+    let found = facts.agreement.as_ref().filter(|a| a.is_beyond());
     found.map(reason).into_iter().collect()
 }
 
