@@ -19,6 +19,7 @@ mod few_rows;
 mod fit;
 mod fleet;
 mod fleet_faults;
+mod gantry;
 mod holds_and_rows;
 mod hostile;
 mod hygiene;

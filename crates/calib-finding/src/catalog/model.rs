@@ -27,6 +27,9 @@ super::topic! {
         "fraction": Warning,
             "Joint `{joint}` seems to move by {factor:percent} (± {sigma:percent}) of joint `{other}` as well; this changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
             "Declare the coupling, and compare the held-out errors: `solve: {joints: {{joint}: {coupled_to: [{other}]}}}`.";
+        "unlike": Warning,
+            "Joint `{joint}` seems to move with joint `{other}` as well, by {factor} (± {sigma}); this changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
+            "Declare the coupling, and compare the held-out errors: `solve: {joints: {{joint}: {coupled_to: [{other}]}}}`.";
     }
     /// A joint moves more or less than its readings.
     JOINT_GAIN = "joint-gain" {
