@@ -63,3 +63,4 @@ mod urdf_out;
 mod verdict;
 mod view;
 mod work;
+mod zero_changed;

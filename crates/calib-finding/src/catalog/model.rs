@@ -82,6 +82,12 @@ super::topic! {
             "The errors in {recordings:code} are {none} per coordinate, but only {best} if body `{body}` moved on its link by {distance} ± {sigma}[[ and {angle}]] before.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
             "Record the validation again without remounting the body between it and the fitted recordings.";
     }
+    /// A joint's zero is another one in held-out recordings.
+    JOINT_ZERO_CHANGED = "joint-zero-changed" {
+        "": Error,
+            "The errors in {recordings:code} are {none} per coordinate, but only {best} if joint `{joint}` stands {step} ± {sigma} beyond its values there, as after a change of its zero.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
+            "Check the encoder of joint `{joint}`, its coupling, how it is homed and, where a recording states its value, this value. If its zero changed, record the fitted recordings again as well: they are of the robot as it was.";
+    }
     /// Tracker and joints were read at different times.
     CLOCK_LAG = "clock-lag" {
         "rows_before": Error,
