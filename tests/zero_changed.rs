@@ -61,7 +61,7 @@ fn a_zero_that_changed_before_the_validation_is_named() {
 
 /// At the last joint the body can have turned on its link as well.
 #[test]
-fn what_cannot_be_told_from_a_zero_is_named_with_it() {
+fn a_body_that_explains_as_much_as_a_zero_is_named_with_it() {
     let report = run(
         &arm(|joint, _, _, _| if joint == 3 { SLIPPED } else { 0.0 }),
         "arm.yaml",
