@@ -431,7 +431,7 @@ fn a_zero_that_jumps_far_is_all_that_is_said_and_has_its_size() {
 }
 
 /// Ripley with readings of a joint that are off by so many degrees from a row of a table on.
-fn jumped(joint: &str, first: usize, table: &str, degrees: f64) -> Scratch {
+pub(crate) fn jumped(joint: &str, first: usize, table: &str, degrees: f64) -> Scratch {
     let dir = Scratch::new().robot("ripley");
     let mut column = None;
     let mut row = 0;

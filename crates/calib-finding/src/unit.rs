@@ -42,6 +42,12 @@ pub enum Unit {
     /// Compliance of a prismatic joint, m/N.
     #[serde(rename = "m/N")]
     MeterPerNewton,
+    /// Motion of a revolute joint per motion of a prismatic one, rad/m; people read degrees per meter.
+    #[serde(rename = "rad/m")]
+    RadianPerMeter,
+    /// Motion of a prismatic joint per motion of a revolute one, m/rad; people read millimeters per radian.
+    #[serde(rename = "m/rad")]
+    MeterPerRadian,
     /// Thermal expansion, 1/K.
     #[serde(rename = "1/K")]
     PerKelvin,
@@ -65,6 +71,8 @@ impl Unit {
             Unit::RadianPerSecond => "rad/s",
             Unit::RadianPerNewtonMeter => "rad/(N·m)",
             Unit::MeterPerNewton => "m/N",
+            Unit::RadianPerMeter => "rad/m",
+            Unit::MeterPerRadian => "m/rad",
             Unit::PerKelvin => "1/K",
             Unit::KilogramMeter => "kg·m",
             Unit::Kilogram => "kg",
@@ -87,6 +95,8 @@ impl Unit {
             Unit::RadianPerSecond => (DEGREES, "°/s"),
             Unit::RadianPerNewtonMeter => (DEGREES, "°/(N·m)"),
             Unit::MeterPerNewton => (1e3, " mm/N"),
+            Unit::RadianPerMeter => (DEGREES, "°/m"),
+            Unit::MeterPerRadian => (1e3, " mm/rad"),
             Unit::PerKelvin => (1e6, " ppm/K"),
             Unit::KilogramMeter => (1.0, " kg·m"),
             Unit::Kilogram => (1.0, " kg"),
@@ -104,6 +114,8 @@ impl Unit {
             Unit::RadianPerSecond => "deg/s",
             Unit::RadianPerNewtonMeter => "deg/(N·m)",
             Unit::MeterPerNewton => "mm/N",
+            Unit::RadianPerMeter => "deg/m",
+            Unit::MeterPerRadian => "mm/rad",
             Unit::PerKelvin => "ppm/K",
             Unit::KilogramMeter => "kg·m",
             Unit::Kilogram => "kg",

@@ -30,6 +30,9 @@ super::topic! {
         "fraction": Warning,
             "Joint `{joint}` seems to move by {factor:percent} (± {sigma:percent}) of joint `{other}` as well; this changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
             "Declare the coupling, and compare the held-out errors: `solve: {joints: {{joint}: {coupled_to: [{other}]}}}`.";
+        "unlike": Warning,
+            "Joint `{joint}` seems to move with joint `{other}` as well, by {factor} (± {sigma}); this changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
+            "Declare the coupling, and compare the held-out errors: `solve: {joints: {{joint}: {coupled_to: [{other}]}}}`.";
     }
     /// A joint moves more or less than its readings.
     JOINT_GAIN = "joint-gain" {
@@ -81,6 +84,12 @@ super::topic! {
         "held_out": Error,
             "The errors in {recordings:code} are {none} per coordinate, but only {best} if body `{body}` moved on its link by {distance} ± {sigma}[[ and {angle}]] before.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
             "Record the validation again without remounting the body between it and the fitted recordings.";
+    }
+    /// A joint's zero is another one in held-out recordings.
+    JOINT_ZERO_CHANGED = "joint-zero-changed" {
+        "": Error,
+            "The errors in {recordings:code} are {none} per coordinate, but only {best} if joint `{joint}` stands {step} ± {sigma} beyond its values there, as after a change of its zero.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
+            "Check the encoder of joint `{joint}`, its coupling, how it is homed and, where a recording states its value, this value. If its zero changed, record the fitted recordings again as well: they are of the robot as it was.";
     }
     /// Tracker and joints were read at different times.
     CLOCK_LAG = "clock-lag" {

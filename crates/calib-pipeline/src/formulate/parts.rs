@@ -117,16 +117,11 @@ pub(crate) fn everything(inputs: &Inputs, open: &[JointId]) -> Solve {
     solve
 }
 
-/// Joints whose motion this one could follow: of the same kind, on a chain to something that is measured.
+/// Joints whose motion this one could follow: on a chain to something that is measured.
 fn couplings(inputs: &Inputs, open: &[JointId], joint: JointId) -> Vec<JointId> {
     let model = &inputs.robot.model;
-    let kind = |j: JointId| {
-        (
-            model.joint(j).kind == JointKind::Fixed,
-            model.joint(j).kind.turns(),
-        )
-    };
-    if kind(joint).0 {
+    let fixed = |j: JointId| model.joint(j).kind == JointKind::Fixed;
+    if fixed(joint) {
         return Vec::new();
     }
     let profile = &inputs.robot.profile;
@@ -143,8 +138,8 @@ fn couplings(inputs: &Inputs, open: &[JointId], joint: JointId) -> Vec<JointId> 
         })
     };
     let others = open.iter().copied();
-    let alike = others.filter(|o| *o != joint && kind(*o) == kind(joint));
-    alike.filter(together).collect()
+    let moving = others.filter(|o| *o != joint && !fixed(*o));
+    moving.filter(together).collect()
 }
 
 impl Parts {

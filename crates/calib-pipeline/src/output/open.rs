@@ -7,6 +7,8 @@
 //! |---|---|---|
 //! | gain of a joint | 0.5 % | a wrong tooth in a belt of two hundred; encoders themselves are better |
 //! | share of another joint's motion | 1 % | the prior of couplings in a profile |
+//! | the same of a turning joint in a sliding one's | 0.02 rad per m | a rail that is twisted by 1° over a meter |
+//! | the same of a sliding joint in a turning one's | 0.3 mm per rad | a spline beside the screw of a quill that is off by 2 mm per turn |
 //! | eccentricity | 0.2° | an encoder disk off its axis by 0.1 mm at 30 mm |
 //! | yield under gravity | 0.2° at the largest load | strain-wave gears under their rated torque |
 //! | zero of a joint, a step | 0.2° | a tooth of a belt, a slipped coupling |
@@ -39,6 +41,10 @@ const DESIGN: usize = 300;
 
 const GAIN: f64 = 0.005;
 const CROSSTALK: f64 = 0.01;
+/// A turning joint that follows a sliding one, rad/m.
+const TURNED: f64 = 0.02;
+/// A sliding joint that follows a turning one, m/rad.
+const SHIFTED: f64 = 3e-4;
 const DEGREE: f64 = std::f64::consts::PI / 180.0;
 const ECCENTRICITY: f64 = 0.2 * DEGREE;
 /// At the largest load.
@@ -267,13 +273,17 @@ impl<'a> Places<'a> {
                 let step = self.since(Moves::Joint(edge), STEP, &self.late(Moves::Joint(edge)));
                 add(of(UntestedKind::Step), vec![Some(step)]);
             }
-            let alike = |o: &&JointId| **o != joint && model.joint(**o).kind.turns() == turns;
-            for &other in joints.iter().filter(alike) {
+            for &other in joints.iter().filter(|o| **o != joint) {
                 let coupled = Untested {
                     other: Some(model.joint(other).name.clone()),
                     ..of(UntestedKind::Coupling)
                 };
-                let share = effect(EffectKind::Coupling, CROSSTALK, Some(other));
+                let sigma = match (turns, model.joint(other).kind.turns()) {
+                    (true, false) => TURNED,
+                    (false, true) => SHIFTED,
+                    _ => CROSSTALK,
+                };
+                let share = effect(EffectKind::Coupling, sigma, Some(other));
                 add(coupled, vec![share]);
             }
         }

@@ -19,7 +19,7 @@ pub(super) fn still_moved(inputs: &Inputs, checked: &Checked, verified: &Verifie
     let Some((inputs, fit)) = with_missing(inputs, checked, verified) else {
         return all();
     };
-    let again = moved(&inputs, &checked.tracks, &fit.calibration);
+    let again = moved(&inputs, &checked.tracks, &fit.calibration, Some(&fit));
     let found = |finding: &Finding| {
         let same = |other: &Finding| other.id == finding.id && other.subject == finding.subject;
         again.iter().any(same)

@@ -20,8 +20,10 @@ pub mod readings;
 pub mod residuals;
 pub mod robot_changes;
 mod scatter;
+mod seen;
 mod suspects;
 pub(crate) mod tracker_noise;
+mod tried;
 
 use std::collections::BTreeMap;
 
@@ -76,7 +78,7 @@ pub fn verified(
             })
         },
         || Verified {
-            findings: moved(inputs, tracks, &solved.robot),
+            findings: moved(inputs, tracks, &solved.robot, fit),
             loops: close_loops(inputs, tracks, &solved.body_from_origin(), &solved.fk),
             held_out: held_out(inputs, tracks, nominal, solved, refitted),
             known: fit.map_or_else(Default::default, |fit| known_numbers(inputs, fit)),
@@ -113,22 +115,14 @@ fn not_tested(fit: &MlFit) -> Option<Finding> {
 /// What moved within the fitted recordings seems to have moved before the validation too: the fit has the mean of both places.
 /// One cause, one finding: the change, as severe as the worse of the two.
 fn one_cause(changed: Finding, before_validation: Vec<Finding>) -> Vec<Finding> {
-    // Nothing for the tracker.
-    let body = |finding: &Finding| {
-        finding
-            .facts
-            .get("body")
-            .and_then(Fact::word)
-            .map(str::to_owned)
-    };
-    let places = ["body", "tracker"];
+    let kinds = ["body", "tracker", "joint", "axis"];
     let kind = changed.facts.get("kind").and_then(Fact::word);
-    if changed.facts.get("physics").is_some() || !kind.is_some_and(|kind| places.contains(&kind)) {
+    if changed.facts.get("physics").is_some() || !kind.is_some_and(|kind| kinds.contains(&kind)) {
         return std::iter::once(changed).chain(before_validation).collect();
     }
     let (same, other): (Vec<Finding>, Vec<Finding>) = before_validation
         .into_iter()
-        .partition(|f| body(f) == body(&changed));
+        .partition(|f| f.subject.about == changed.subject.about);
     let severity = same.iter().map(|f| f.severity).max();
     let severity = severity.map_or(changed.severity, |s| s.max(changed.severity));
     std::iter::once(changed.with_severity(severity))

@@ -321,11 +321,14 @@ fn of_prediction(reason: &Reason, v: &Values<'_>) -> String {
             v.number("upper"),
             v.number("limit")
         ),
-        ReasonId::HeldOutBeyondStated => format!(
-            "χ²/dof of the held-out errors is {}, above {}: the stated uncertainty is too small.",
-            v.number("value"),
-            v.number("high")
-        ),
+        ReasonId::HeldOutBeyondStated => {
+            let [value, high] = ["value", "high"].map(|key| v.number(key));
+            let because = match v.name("cause") {
+                "" => "the stated uncertainty is too small".to_owned(),
+                cause => format!("by what `{cause}` names, or the stated uncertainty is too small"),
+            };
+            format!("χ²/dof of the held-out errors is {value}, above {high}: {because}.")
+        }
         ReasonId::UncertaintyTooSmall => format!(
             "The fit states {} rms over the recorded joint ranges, and the data do not exclude {} with {} rms. Record more poses in which the joints move together.",
             v.number("stated"),

@@ -187,7 +187,7 @@ impl CaseResult {
 }
 
 /// Findings that name a cause.
-const NAMES: [&str; 20] = [
+const NAMES: [&str; 21] = [
     "joint-sign",
     "joint-order",
     "unit-mismatch",
@@ -202,6 +202,7 @@ const NAMES: [&str; 20] = [
     "pose-convention",
     "tracker-moved",
     "body-remounted",
+    "joint-zero-changed",
     "body-flip",
     "missing-physics",
     "changed-while-recording",

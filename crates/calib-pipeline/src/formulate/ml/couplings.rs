@@ -7,7 +7,7 @@ use super::joints::{Row, moves};
 use crate::formulate::formulation::Formulation;
 use crate::prepare::inputs::Inputs;
 
-/// Declares every joint's share in the motion of every other one of its kind that the recordings move, unless the profile frees it.
+/// Declares every joint's share in the motion of every other one on its chain that the recordings move, whether they turn or slide, unless the profile frees it.
 pub(super) fn coupling_candidates(
     formulation: &mut Formulation,
     inputs: &Inputs,
@@ -42,15 +42,14 @@ pub(super) fn coupling_candidates(
         let stated = inputs.robot.profile.solve.joints.get(joint);
         let stated = stated.map_or(&[][..], |exception| &exception.coupled_to);
         for (other, readings) in &driven {
-            let (own, that) = (model.joint(*joint), model.joint(*other));
-            let alike = own.kind.turns() == that.kind.turns();
             let apart = !chains
                 .iter()
                 .any(|c| c.contains(joint) && c.contains(other));
-            if joint == other || !alike || apart || stated.contains(other) {
+            if joint == other || apart || stated.contains(other) {
                 continue;
             }
-            let name = format!("{}.coupling.{}", own.name, that.name);
+            let (own, that) = (&model.joint(*joint).name, &model.joint(*other).name);
+            let name = format!("{own}.coupling.{that}");
             let problem = &mut formulation.problem;
             problem.shared_candidate(edge, EffectKind::Coupling, name, readings.clone());
         }

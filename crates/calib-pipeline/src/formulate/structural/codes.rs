@@ -36,7 +36,16 @@ fn of_hypothesis(layout: &Layout<'_>, hypothesis: &Hypothesis) -> String {
             joint: j,
             source,
             factor,
-        } => format!("coupling({}, {}, {factor:+.3})", joint(j), joint(source)),
+        } => {
+            let unit = layout.unit_of_share(j, source);
+            let (scale, suffix) = unit.display();
+            let factor = scale * factor;
+            format!(
+                "coupling({}, {}, {factor:+.3}{suffix})",
+                joint(j),
+                joint(source)
+            )
+        }
         Hypothesis::Gain { joint: j, factor } => format!("gain({}, {factor:.4})", joint(j)),
         Hypothesis::Offset { joint: j, turns } => {
             let degrees = match turns {

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use calib_checks::structural::{
     Body, BodyIndex, Chain, Data, JointIndex, LinkIndex, Measured, RecordingIndex, Scope,
 };
+use calib_finding::Unit;
 use calib_profile::{BodyKind, Usage};
 use calib_urdf::{JointId, LinkId, RobotModel};
 use nalgebra::{Isometry3, Point3};
@@ -141,6 +142,17 @@ impl<'a> Layout<'a> {
         match self.data.chain.turns(joint.0) {
             Some(false) => (1e3 * value, "mm"),
             _ => (value.to_degrees(), "deg"),
+        }
+    }
+
+    /// Unit of a joint's share in the motion of another: none between two that turn or two that slide.
+    #[must_use]
+    pub fn unit_of_share(&self, joint: JointIndex, source: JointIndex) -> Unit {
+        let turns = |j: JointIndex| self.data.chain.turns(j.0) != Some(false);
+        match (turns(joint), turns(source)) {
+            (true, false) => Unit::RadianPerMeter,
+            (false, true) => Unit::MeterPerRadian,
+            _ => Unit::One,
         }
     }
 

@@ -128,10 +128,16 @@ fn continuous_finding(layout: &Layout<'_>, found: &Continuous) -> Option<Finding
             factor,
         } => {
             let name = layout.joint(joint);
-            Finding::of_kind(catalog::JOINT_COUPLING, "fraction", Subject::joint(name))
+            let unit = layout.unit_of_share(joint, source);
+            let form = if unit == Unit::One {
+                "fraction"
+            } else {
+                "unlike"
+            };
+            Finding::of_kind(catalog::JOINT_COUPLING, form, Subject::joint(name))
                 .with("joint", Fact::name(name))
                 .with("other", Fact::name(layout.joint(source)))
-                .with("factor", Fact::ratio(factor))
+                .with("factor", Fact::number(factor, unit))
         }
         Hypothesis::Lag { recording, seconds } => {
             let name = layout.recordings[recording.0].name.clone();
@@ -151,9 +157,13 @@ fn continuous_finding(layout: &Layout<'_>, found: &Continuous) -> Option<Finding
         }
         _ => return None,
     };
+    let unit = match found.hypothesis {
+        Hypothesis::Coupling { joint, source, .. } => layout.unit_of_share(joint, source),
+        _ => Unit::One,
+    };
     Some(
         finding
-            .with("sigma", Fact::ratio(found.sigma))
+            .with("sigma", Fact::number(found.sigma, unit))
             .with("effect", Fact::meters(found.effect))
             .with_some("alternatives", alternatives),
     )

@@ -1,6 +1,6 @@
 //! Errors that the fit predicts over the joint ranges, and whether held-out errors bear its uncertainty out.
 
-use calib_finding::Fact;
+use calib_finding::{Fact, Id, catalog};
 
 use crate::verdict::facts::{Facts, Predicted, Untested, Validation};
 use crate::verdict::rules::of_data::REPEATED;
@@ -75,11 +75,24 @@ fn of_effect(reason: Reason, what: &Untested) -> Reason {
         .with_some("other", what.other.as_ref().map(Fact::name))
 }
 
+/// Findings of what changed before the validation: its errors are then no measure of what the fit states.
+const CHANGED_BEFORE: [Id; 3] = [
+    catalog::JOINT_ZERO_CHANGED,
+    catalog::TRACKER_MOVED,
+    catalog::BODY_REMOUNTED,
+];
+
 pub(super) fn agreement(facts: &Facts) -> Vec<Reason> {
+    let said = |id: &Id| {
+        let mut all = facts.errors.iter().chain(&facts.warnings);
+        all.any(|said| said == id.as_str())
+    };
+    let cause = CHANGED_BEFORE.into_iter().find(said);
     let reason = |a: &crate::Agreement| {
         Reason::new(ReasonId::HeldOutBeyondStated, unless_measured(facts))
             .with("value", Fact::ratio(a.value))
             .with("high", Fact::ratio(a.accepted()))
+            .with_some("cause", cause.map(|id| Fact::choice(id.as_str())))
     };
     let found = facts.agreement.as_ref().filter(|a| a.is_beyond());
     found.map(reason).into_iter().collect()

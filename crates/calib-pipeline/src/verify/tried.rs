@@ -1,0 +1,225 @@
+//! Motions between the fitted recordings and a held-out one, each fitted to the points of that recording.
+//!
+//! ```text
+//! none      e = p_i − s_i                                            p predicted, s seen
+//! tracker   e = T p_i − s_i,   T ∈ SE(3) the same for all bodies      6 unknowns
+//! body      e = m_k − (tracker_from_link_i)⁻¹ s_ik                    one place m_k per point of the body on its link
+//! joint     e = p_i(q_j + c) − s_i                                    1 unknown
+//! r² = Σ|e|² / (3N − unknowns)                                                                            (1)
+//! ```
+
+use calib_geometry::registration::rigid_registration;
+use calib_urdf::JointId;
+use nalgebra::{Isometry3, Point3, Vector3};
+
+use crate::verify::seen::{Seen, View};
+
+/// Errors beyond this many times the median under a hypothesis are gross outliers of the tracker.
+const GROSS: f64 = 5.0;
+/// Step of a joint in difference quotients, rad or m.
+const STEP: f64 = 1e-5;
+/// Linearizations of a joint's step, where the first is worth it.
+const ROUNDS: usize = 3;
+/// Part of the errors that is left at most where it is.
+const WORTH: f64 = 0.7;
+
+/// What may have moved.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Motion {
+    Tracker,
+    Body(String),
+    Joint(JointId),
+}
+
+/// A motion that was tried.
+pub(super) struct Tried {
+    pub(super) motion: Motion,
+    /// r of (1), m, and of the same points without a motion.
+    pub(super) left: f64,
+    pub(super) none: f64,
+    /// Where the middle of what was seen went, m, and its σ; of a joint by how much it stands further than it is read, rad or m.
+    pub(super) shift: f64,
+    pub(super) sigma: f64,
+    /// Rotation, where it is determined, rad; none of a joint.
+    pub(super) angle: Option<f64>,
+    /// Which of the points were taken: the others are gross outliers.
+    pub(super) kept: Vec<bool>,
+}
+
+/// T of (1).
+pub(super) fn tracker(points: &[Seen<'_>]) -> Option<Tried> {
+    let motion = |kept: &[bool]| -> Option<Isometry3<f64>> {
+        let pairs = points.iter().zip(kept).filter(|(_, kept)| **kept);
+        let (from, to): (Vec<_>, Vec<_>) = pairs.map(|(p, _)| (p.predicted, p.seen)).unzip();
+        Some(rigid_registration(&from, &to, None).ok()?.b_from_a)
+    };
+    let (left, none, kept) = robustly(points, 6, |kept| {
+        let t = motion(kept)?;
+        Some(points.iter().map(|p| t * p.predicted - p.seen).collect())
+    })?;
+    let t = motion(&kept)?;
+    let middle = points
+        .iter()
+        .map(|p| p.predicted.coords)
+        .sum::<Vector3<f64>>()
+        / points.len() as f64;
+    let middle = Point3::from(middle);
+    Some(Tried {
+        motion: Motion::Tracker,
+        left,
+        none,
+        shift: (t * middle - middle).norm(),
+        sigma: sigma(points, left),
+        angle: Some(t.rotation.angle()),
+        kept,
+    })
+}
+
+/// The m_k of (1), for the points of one body; those of the others stay.
+pub(super) fn remounted(points: &[Seen<'_>], body: &str) -> Option<Tried> {
+    let own = || points.iter().filter(|p| p.body == body);
+    let count = own().map(|p| p.point + 1).max()?;
+    let on_link = |p: &Seen<'_>, at: &Point3<f64>| p.tracker_from_link.inverse_transform_point(at);
+    // Seen minus predicted place of every point on the link, mean over the rows.
+    let places = |kept: &[bool]| -> Vec<(Vector3<f64>, Vector3<f64>, usize)> {
+        let mut sums = vec![(Vector3::zeros(), Vector3::zeros(), 0); count];
+        for (p, _) in points
+            .iter()
+            .zip(kept)
+            .filter(|(p, kept)| **kept && p.body == body)
+        {
+            let sum = &mut sums[p.point];
+            sum.0 += on_link(p, &p.predicted).coords;
+            sum.1 += on_link(p, &p.seen).coords;
+            sum.2 += 1;
+        }
+        sums
+    };
+    let (left, none, kept) = robustly(points, 3 * count, |kept| {
+        let sums = places(kept);
+        let error = |p: &Seen<'_>| {
+            let moved = sums.get(p.point).filter(|s| p.body == body && s.2 > 0);
+            let moved = moved.map_or_else(Vector3::zeros, |s| (s.1 - s.0) / s.2 as f64);
+            p.predicted - p.seen + p.tracker_from_link.rotation * moved
+        };
+        Some(points.iter().map(error).collect())
+    })?;
+    let sums = places(&kept);
+    let known = || sums.iter().filter(|s| s.2 > 0);
+    let (from, to): (Vec<_>, Vec<_>) = known()
+        .map(|s| {
+            (
+                Point3::from(s.0 / s.2 as f64),
+                Point3::from(s.1 / s.2 as f64),
+            )
+        })
+        .unzip();
+    let shift = from
+        .iter()
+        .zip(&to)
+        .map(|(a, b)| b - a)
+        .sum::<Vector3<f64>>()
+        / known().count().max(1) as f64;
+    let turned = rigid_registration(&from, &to, None).ok();
+    Some(Tried {
+        motion: Motion::Body(body.to_owned()),
+        left,
+        none,
+        shift: shift.norm(),
+        sigma: sigma(points, left),
+        angle: turned.map(|t| t.b_from_a.rotation.angle()),
+        kept,
+    })
+}
+
+/// c of (1). What is left is that of the robot with the joint moved by c, not of its linearization.
+pub(super) fn zero_changed(view: &View<'_>, points: &[Seen<'_>], joint: JointId) -> Option<Tried> {
+    let mut step = 0.0;
+    let mut at = view.points(None);
+    let mut found = None;
+    for _ in 0..ROUNDS {
+        let beside = view.points(Some((joint, step + STEP)));
+        let slopes: Vec<Vector3<f64>> = at
+            .iter()
+            .zip(beside)
+            .map(|(a, b)| (b.predicted - a.predicted) / STEP)
+            .collect();
+        let (_, _, kept) = robustly(points, 1, |kept| {
+            let by = further(&at, &slopes, kept)?.0;
+            let error = |(p, d): (&Seen<'_>, &Vector3<f64>)| p.predicted - p.seen + d * by;
+            Some(at.iter().zip(&slopes).map(error).collect())
+        })?;
+        let (by, size) = further(&at, &slopes, &kept)?;
+        step += by;
+        at = view.points(Some((joint, step)));
+        let applied = |_: &[bool]| Some(at.iter().map(|p| p.predicted - p.seen).collect());
+        let (left, none, kept) = robustly(points, 1, applied)?;
+        found = Some((left, none, kept, size));
+        // What explains nothing at the first step explains nothing at the second.
+        if left > WORTH * none {
+            break;
+        }
+    }
+    let (left, none, kept, size) = found?;
+    // Points of one posture share its error.
+    let rows = rows(points).max(1) as f64;
+    Some(Tried {
+        motion: Motion::Joint(joint),
+        left,
+        none,
+        shift: step,
+        sigma: left * (points.len() as f64 / rows / size).sqrt(),
+        angle: None,
+        kept,
+    })
+}
+
+/// The step of a joint beyond where the points are predicted, rad or m, and Σ|∂p/∂q|²; `None` where it moves none of them.
+fn further(points: &[Seen<'_>], slopes: &[Vector3<f64>], kept: &[bool]) -> Option<(f64, f64)> {
+    let all = points.iter().zip(slopes).zip(kept);
+    let of_kept = || all.clone().filter(|(_, kept)| **kept).map(|(pair, _)| pair);
+    let size: f64 = of_kept().map(|(_, d)| d.norm_squared()).sum();
+    let along: f64 = of_kept().map(|(p, d)| d.dot(&(p.predicted - p.seen))).sum();
+    (size > 0.0).then(|| (-along / size, size))
+}
+
+/// σ of a mean over the postures, m: points of one posture share its error.
+fn sigma(points: &[Seen<'_>], left: f64) -> f64 {
+    left * (3.0 / rows(points).max(1) as f64).sqrt()
+}
+
+/// Number of postures.
+pub(super) fn rows(points: &[Seen<'_>]) -> usize {
+    let mut rows: Vec<usize> = points.iter().map(|p| p.row).collect();
+    rows.dedup();
+    rows.len()
+}
+
+/// r of (1) with and without a motion, and the points that it was computed from: gross outliers under the motion are left out.
+fn robustly(
+    points: &[Seen<'_>],
+    unknowns: usize,
+    fit: impl Fn(&[bool]) -> Option<Vec<Vector3<f64>>>,
+) -> Option<(f64, f64, Vec<bool>)> {
+    /// Rounds of leaving out.
+    const ROUNDS: usize = 3;
+    let mut kept = vec![true; points.len()];
+    let mut errors = fit(&kept)?;
+    for _ in 0..ROUNDS {
+        let mut lengths: Vec<f64> = errors.iter().map(Vector3::norm).collect();
+        let each = lengths.clone();
+        lengths.sort_by(f64::total_cmp);
+        let gross = GROSS * lengths[lengths.len() / 2];
+        kept = each.iter().map(|e| *e <= gross).collect();
+        errors = fit(&kept)?;
+    }
+    let count = kept.iter().filter(|k| **k).count();
+    let freedom = (3 * count).checked_sub(unknowns).filter(|f| *f > 0)?;
+    let sum = |errors: &mut dyn Iterator<Item = f64>| -> f64 {
+        errors.zip(&kept).filter(|(_, k)| **k).map(|(e, _)| e).sum()
+    };
+    let left = sum(&mut errors.iter().map(Vector3::norm_squared));
+    let none = sum(&mut points.iter().map(|p| (p.predicted - p.seen).norm_squared()));
+    let r = |sum: f64, freedom: usize| (sum / freedom as f64).sqrt();
+    Some((r(left, freedom), r(none, 3 * count), kept))
+}

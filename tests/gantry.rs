@@ -1,0 +1,195 @@
+//! A gantry with a wrist: shares of a sliding joint's motion in that of a turning one, and the other way round.
+
+use crate::scratch;
+
+use std::fmt::Write as _;
+
+use calib_urdf::RobotModel;
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use scratch::Scratch;
+use serde_json::Value;
+
+/// σ of one marker coordinate, m.
+const MARKER: f64 = 2e-4;
+
+/// Name, kind, origin, axis and range (m or rad) of each joint, from the base on.
+const JOINTS: [(&str, &str, &str, &str, [f64; 2]); 5] = [
+    ("gx", "prismatic", "0 0 1.2", "1 0 0", [0.1, 1.4]),
+    ("gy", "prismatic", "0 0 0", "0 1 0", [0.1, 0.9]),
+    ("gz", "prismatic", "0 0 0", "0 0 -1", [0.1, 0.5]),
+    ("gc", "revolute", "0 0 -0.1", "0 0 1", [-2.4, 2.4]),
+    ("ga", "revolute", "0 0 -0.15", "1 0 0", [-1.2, 1.2]),
+];
+
+const PROFILE: &str = "calib: 1
+robot: {name: gantry, urdf: gantry/gantry.urdf}
+tracker: {frame: lab, marker_sigma_mm: 0.2}
+bodies:
+  tool: {link: l5, markers: [t1, t2, t3]}
+recordings:
+  poses: {file: gantry/poses.csv, use: static}
+  checks: {file: gantry/checks.csv, use: validation}
+solve:
+  free: [bodies, tracker, joint_offsets, joint_axes]
+  limits: {held_out_rms_mm: 1}
+";
+
+fn urdf() -> String {
+    let mut text = String::from("<robot name=\"gantry\">\n  <link name=\"l0\"/>\n");
+    for (i, (name, kind, xyz, axis, _)) in JOINTS.iter().enumerate() {
+        let _ = writeln!(
+            text,
+            "  <link name=\"l{}\"/>\n  <joint name=\"{name}\" type=\"{kind}\">\n    <parent link=\"l{i}\"/>\n    <child link=\"l{}\"/>\n    \
+             <origin xyz=\"{xyz}\" rpy=\"0 0 0\"/>\n    <axis xyz=\"{axis}\"/>\n    <limit lower=\"-3\" upper=\"3\" effort=\"50\" velocity=\"2\"/>\n  </joint>",
+            i + 1,
+            i + 1
+        );
+    }
+    text + "</robot>\n"
+}
+
+/// By how much the joint `of` follows the joint `with` (numbers in [`JOINTS`]), m or rad per m or rad.
+#[derive(Clone, Copy)]
+struct Share {
+    of: usize,
+    with: usize,
+    factor: f64,
+}
+
+fn recording(robot: &RobotModel, share: Option<Share>, n: usize, seed: u64) -> String {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let tracker_from_root = Isometry3::from_parts(
+        Translation3::new(0.9, 0.3, 0.1),
+        UnitQuaternion::from_euler_angles(0.02, -0.03, 0.7),
+    );
+    let tool = [[0.05, 0.0, 0.1], [0.12, 0.01, 0.06], [0.02, 0.08, 0.08]];
+    let mut text = String::from("gx_m,gy_m,gz_m,gc_rad,ga_rad");
+    for k in 1..=3 {
+        let _ = write!(text, ",t{k}_x_mm,t{k}_y_mm,t{k}_z_mm");
+    }
+    text.push('\n');
+    let link = robot.link_id("l5").expect("there");
+    for _ in 0..n {
+        let q = JOINTS.map(|joint| rng.random_range(joint.4[0]..joint.4[1]));
+        // Zeros that the fit finds.
+        let mut true_q = q.to_vec();
+        true_q[3] += 0.004;
+        true_q[4] -= 0.003;
+        if let Some(Share { of, with, factor }) = share {
+            true_q[of] += factor * q[with];
+        }
+        let tracker_from_link = tracker_from_root * robot.root_from_link(&true_q, link);
+        let mut cells: Vec<String> = q.iter().map(|v| format!("{v:.9}")).collect();
+        for p in tool {
+            let noise = Vector3::from_fn(|_, _| {
+                let n: f64 = StandardNormal.sample(&mut rng);
+                MARKER * n
+            });
+            let seen = (tracker_from_link * Point3::from(p)).coords + noise;
+            cells.extend(seen.iter().map(|v| format!("{:.6}", v * 1e3)));
+        }
+        text += &(cells.join(",") + "\n");
+    }
+    text
+}
+
+fn gantry(share: Option<Share>, seed: u64) -> Scratch {
+    let robot = RobotModel::from_urdf_text(&urdf(), "true").expect("a robot");
+    Scratch::new()
+        .file("gantry/gantry.urdf", urdf())
+        .file("gantry.yaml", PROFILE)
+        .file("gantry/poses.csv", recording(&robot, share, 50, seed))
+        .file(
+            "gantry/checks.csv",
+            recording(&robot, share, 15, seed + 1000),
+        )
+}
+
+fn run(dir: &Scratch) -> Value {
+    dir.calib(["run", "gantry.yaml", "--out", "out"]);
+    dir.json("out/report.json")
+}
+
+/// Findings that are more than information.
+fn warnings(report: &Value) -> Vec<&Value> {
+    let all = report["findings"].as_array().expect("findings").iter();
+    all.filter(|f| f["severity"] != "info").collect()
+}
+
+fn held_out(report: &Value) -> f64 {
+    let rms = &report["verification"]["held_out"]["calibrated"]["rms_m"];
+    rms.as_f64().expect("measured")
+}
+
+#[test]
+fn a_share_of_a_sliding_joint_in_a_turning_one_is_named_and_verified() {
+    // 0.02 rad of `ga` per meter of `gy`; 0.5 mm of `gz` per radian of `gc`.
+    for (of, with, factor, names) in [(4, 1, 0.02, ["ga", "gy"]), (2, 3, 5e-4, ["gz", "gc"])] {
+        let [of_name, with_name] = names;
+        let parameter = format!("{of_name}.coupling.{with_name}");
+        for seed in [1, 2, 3] {
+            let dir = gantry(Some(Share { of, with, factor }), seed);
+            let report = run(&dir);
+            let found = warnings(&report);
+            let named =
+                |f: &&Value| f["id"] == "missing-physics" && f["facts"]["parameter"] == *parameter;
+            assert!(found.iter().any(named), "{parameter} {seed}: {found:#?}");
+            let coupled =
+                format!("solve:\n  joints: {{{of_name}: {{coupled_to: [{with_name}]}}}}\n");
+            let dir = dir.edit("gantry.yaml", "solve:\n", &coupled);
+            let with_it = run(&dir);
+            let better = held_out(&with_it) / held_out(&report);
+            assert!(better < 0.9, "{parameter} {seed}: {better}");
+            let left = warnings(&with_it);
+            let missing = left.iter().any(|f| f["id"] == "missing-physics");
+            assert!(!missing, "{parameter} {seed}: {left:#?}");
+            let all = with_it["parameters"].as_array().expect("a list");
+            let estimate = all.iter().find(|p| p["name"] == *parameter);
+            let estimate = estimate.or_else(|| {
+                let coupling = format!("{of_name}.coupling");
+                all.iter().find(|p| p["name"] == *coupling)
+            });
+            let estimate = estimate.expect("freed");
+            let of = |key: &str| estimate[key].as_f64().expect("a number");
+            assert!(
+                (of("value") - factor).abs() < 4.0 * of("sigma"),
+                "{estimate}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_gantry_that_is_in_order_has_no_share() {
+    for seed in [11, 12, 13, 14] {
+        let report = run(&gantry(None, seed));
+        let found = warnings(&report);
+        assert!(found.is_empty(), "{seed}: {found:#?}");
+        let verdict = report["verdict"].as_str().expect("a word");
+        assert!(verdict.starts_with("accepted"), "{seed}: {verdict}");
+    }
+}
+
+/// A share between joints of two kinds has a unit; it is no percentage.
+#[test]
+fn a_large_share_between_unlike_joints_is_said_in_its_unit() {
+    for (of, with, factor, unit, shown) in [
+        (4, 1, 0.3, "rad/m", "°/m"),
+        (2, 3, 0.01, "m/rad", " mm/rad"),
+    ] {
+        let dir = gantry(Some(Share { of, with, factor }), 21);
+        let checked = dir.calib(["check", "gantry.yaml", "--json"]).json();
+        let found = warnings(&checked);
+        let coupling = found.iter().find(|f| f["id"] == "joint-coupling");
+        let coupling = coupling.unwrap_or_else(|| panic!("{of} {with}: {found:#?}"));
+        let facts = &coupling["facts"];
+        assert_eq!(facts["factor"]["unit"], unit, "{coupling:#}");
+        let value = facts["factor"]["value"].as_f64().expect("a number");
+        assert!((value - factor).abs() < 0.1 * factor, "{coupling:#}");
+        let text = coupling["text"].as_str().expect("a text");
+        assert!(text.contains(shown) && !text.contains('%'), "{text}");
+    }
+}
