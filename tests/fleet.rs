@@ -126,6 +126,24 @@ fn rows(dir: &Scratch, folder: &str) -> Vec<std::collections::BTreeMap<String, S
         .collect()
 }
 
+/// Names that a spreadsheet would compute are texts in the table.
+#[test]
+fn names_of_a_fleet_are_no_formulas() {
+    let dir = Scratch::new();
+    fleet(&dir, "old", 1, &[]);
+    let list = "calib_fleet: 1\nrobots:\n  - {name: \"+1+1\", series: \"@s\", profile: old/r000/r.yaml}\n  - {name: \"=cmd|' /C x'!A1\", profile: absent.yaml}\n";
+    let dir = dir.file("list.yaml", list);
+    dir.calib(["batch", "list.yaml", "--out", "out"]);
+    let rows = rows(&dir, "out");
+    let names: Vec<&str> = rows.iter().map(|row| row["name"].as_str()).collect();
+    assert_eq!(names, ["'+1+1", "'=cmd|' /C x'!A1"]);
+    assert_eq!(rows[0]["series"], "'@s");
+    let cells = rows.iter().flat_map(|row| row.values());
+    for text in cells.filter(|text| text.parse::<f64>().is_err()) {
+        assert!(!text.starts_with(['=', '+', '-', '@']), "{text}");
+    }
+}
+
 /// One elbow that drifted is found, a robot that cannot be calibrated is a row, and nothing depends on how the work is divided.
 #[test]
 fn a_fleet_is_calibrated_and_compared_with_last_time() {

@@ -269,6 +269,84 @@ fn no_control_character_of_a_file_reaches_the_terminal() {
 }
 
 #[test]
+fn a_profile_with_hidden_characters_has_their_line() {
+    for (key, named) in [
+        ("name: ripley", r#"name: "x\e[8mHIDE""#),
+        ("name: ripley", r#"name: "x\nFAKE LINE""#),
+        ("frame: vicon", r#"frame: "\e[31mred""#),
+        ("  linkM: ", "  \"link\\tM\": "),
+    ] {
+        let dir = Scratch::new().brief("ripley");
+        let dir = dir.edit("robots/ripley.yaml", key, named);
+        for command in ["check", "run", "plan", "twin", "simulate"] {
+            let profile = [command, "robots/ripley.yaml", "--color", "always"];
+            let ran = dir.calib_with(&[&profile[..], &["--out", "new"]].concat()[..]);
+            let ran = match command {
+                "check" => dir.calib_with(&profile),
+                _ => ran,
+            };
+            let ran = ran.expect(2);
+            assert!(ran.stderr.contains("robots/ripley.yaml:"), "{}", ran.stderr);
+            assert!(ran.stderr.contains("this text has "), "{}", ran.stderr);
+            assert!(!(ran.stdout + &ran.stderr).contains('\u{1b}'));
+        }
+        assert!(!dir.path("new").exists());
+    }
+}
+
+#[test]
+fn commands_to_copy_are_quoted_for_the_shell() {
+    let dir = Scratch::new().brief("ripley");
+    for out in ["a b", "c; touch stolen", "it's", "-x"] {
+        let stated = format!("--out={out}");
+        let ran = dir.calib(["run", "robots/ripley.yaml", &stated]).expect(0);
+        let words = ran.words();
+        let (_, next) = words.split_once("Next: ").expect("a command");
+        let (command, _) = next.split_once(" ACCEPTED").expect("the verdict");
+        let shown = shell(&dir, command);
+        assert!(shown.status.success(), "{command}: {shown:?}");
+        assert!(!dir.path("stolen").exists());
+    }
+    let profile = "my robots/ripley.yaml";
+    std::fs::rename(dir.path("robots"), dir.path("my robots")).expect("renamed");
+    let text = dir.read(profile);
+    let dir = dir.edit(profile, "held_out_rms_mm: 1.5", "held_out_rms_mm: 0.0001");
+    let ran = dir.calib(["run", profile, "--out", "new"]).expect(1);
+    assert!(
+        ran.words().contains("calib run 'my robots/ripley.yaml'"),
+        "{}",
+        ran.stdout
+    );
+    let dir = dir.file(profile, text);
+    let again = dir.calib(["run", profile, "--out", "new"]).expect(0);
+    assert!(
+        again.stdout.contains("Next: calib apply new "),
+        "{}",
+        again.stdout
+    );
+}
+
+#[test]
+fn more_poses_than_a_computer_holds_are_refused_at_their_line() {
+    for (from, to) in [
+        ("poses: 40", "poses: 4000000000"),
+        ("to: 160, poses: 31", "to: 160, poses: 99999999"),
+    ] {
+        let dir = Scratch::new().robot("ripley");
+        let dir = dir.edit("robots/ripley.yaml", from, to);
+        let ran = dir.calib(["simulate", "robots/ripley.yaml", "--out", "new"]);
+        let ran = ran.expect(2);
+        assert!(ran.stderr.contains("poses are asked for"), "{}", ran.stderr);
+        assert!(
+            ran.stderr.contains("robots/ripley.yaml:1"),
+            "{}",
+            ran.stderr
+        );
+        assert!(!dir.path("new").exists());
+    }
+}
+
+#[test]
 fn names_that_cannot_be_files_are_found_before_the_fit() {
     let dir = Scratch::new().brief("ripley");
     let text = dir.read("robots/ripley.yaml");

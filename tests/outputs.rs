@@ -173,3 +173,33 @@ fn what_is_wrong_is_found() {
         }
     }
 }
+
+/// A measurement in the place of a simulated recording is not simulated away, though the list of the folder has its name.
+#[test]
+fn a_measured_recording_is_not_simulated_away() {
+    let dir = Scratch::new().brief("ripley");
+    let simulate = ["simulate", "robots/ripley.yaml", "--out", "new"];
+    dir.calib(simulate).expect(0);
+    dir.calib(simulate).expect(0);
+    let measured = "# calib record: robot ripley\nt_s,waist_deg\n0,1\n";
+    let dir = dir.file("new/checks.csv", measured);
+    let before = dir.files("new");
+    let ran = dir.calib(simulate).expect(7);
+    let said = "checks.csv is not the file any more that this program wrote there";
+    assert!(ran.stderr.contains(said), "{}", ran.stderr);
+    assert!(dir.files("new") == before, "something was written");
+    dir.without("new/checks.csv").calib(simulate).expect(0);
+}
+
+/// A table of postures without a column of every joint is taken with zeros, and that is said.
+#[test]
+fn joints_that_a_region_leaves_out_are_named() {
+    let done = crate::scratch::finished("ripley", "ml");
+    let folder = done.dir.path("out").display().to_string();
+    let dir = Scratch::new().file("few.csv", "waist_deg\n0\n10\n20\n30\n");
+    let model = format!("{folder}/ripley.calibrated.model.json");
+    let export = ["export", &model, "--to", "urdf-best", "--region", "few.csv"];
+    let ran = dir.calib_with(&export);
+    let said = "joints without a column count as 0: shoulder, ";
+    assert!(ran.stderr.contains(said), "{}", ran.stderr);
+}

@@ -397,7 +397,7 @@ fn refusals_before_anything_is_written() {
         (
             justin(&["--source", "dtrack:0", "--recording", "head_sweep"]),
             7,
-            "already exists. Continue it with `--append`, or choose another file with",
+            "already exists\n  help: continue it with `--append`, or choose another file with",
         ),
         (
             justin(&[

@@ -43,6 +43,7 @@ mod real_robots;
 mod record;
 mod record_plan;
 mod redefined;
+mod renamed;
 mod robots;
 mod scratch;
 mod screens;

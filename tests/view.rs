@@ -180,6 +180,8 @@ fn programs_read_json_from_every_command() {
         .expect(6);
     assert_eq!(checked.json()["passed"], false);
     assert_eq!(checked.json()["tests"][0]["outcome"], "FAILED");
+    assert_eq!(checked.json()["exit_code"], 6);
+    assert!(checked.json()["error"].is_string() && checked.json()["remedy"].is_string());
 
     let refused = dir.calib(["record", "absent.yaml", "--source", "dtrack:1", "--json"]);
     assert_eq!(refused.code, 2);
@@ -188,6 +190,80 @@ fn programs_read_json_from_every_command() {
         line["error"].is_string() && line["remedy"].is_string(),
         "{line}"
     );
+}
+
+/// Tables, other formats and remarks are JSON too, and an error has its place and its remedy.
+#[test]
+fn texts_and_remarks_are_json_where_json_is_asked_for() {
+    let done = scratch::finished("ripley", "ml");
+    let out = done.dir.path("out").display().to_string();
+    let model = format!("{out}/ripley.calibrated.model.json");
+    let table = done.dir.path("robots/ripley/checks.csv");
+    let table = table.display().to_string();
+    let urdf = done
+        .dir
+        .path("robots/ripley/r17.urdf")
+        .display()
+        .to_string();
+    let dir = Scratch::new()
+        .file("few.csv", "waist_deg\n0\n1\n")
+        .file("there.csv", "");
+    let lines = |text: &str| {
+        let all = text.lines().map(serde_json::from_str::<Value>);
+        assert!(all.into_iter().all(|line| line.is_ok()), "{text}");
+    };
+    for (arguments, key) in [
+        (
+            &["diff", &urdf, &format!("{out}/ripley.calibrated.urdf")][..],
+            "joints",
+        ),
+        (&["predict", &model, "few.csv"], "text"),
+        (&["predict", &model, "few.csv", "--out", "p.csv"], "written"),
+        (&["correct", &model, &table], "text"),
+        (
+            &["export", &model, "--to", "urdf", "--region", "few.csv"],
+            "text",
+        ),
+        (
+            &["export", &model, "--to", "urdf", "--out", "e.urdf"],
+            "written",
+        ),
+        (&["convert", "few.csv", "c.csv"], "written"),
+    ] {
+        let ran = dir.calib_with(&[&["--json"], arguments].concat());
+        assert!(
+            ran.json().get(key).is_some(),
+            "{arguments:?}: {}",
+            ran.stdout
+        );
+        lines(&ran.stderr);
+    }
+    for arguments in [
+        &["view", "absent"][..],
+        &["fit", "cor", "absent.csv"],
+        &["apply", "absent", "x.urdf", "--diff"],
+        &["revert", "absent.urdf", "--in-place"],
+    ] {
+        let ran = dir.calib_with(&[&["--json"], arguments].concat());
+        let file = ran.json()["place"]["file"].to_string();
+        assert!(file.contains("absent"), "{}", ran.stdout);
+        assert!(ran.json()["remedy"].is_string(), "{}", ran.stdout);
+    }
+    let wrong = dir.calib(["--json", "frobnicate"]).expect(2);
+    assert!(wrong.json()["remedy"].is_string(), "{}", wrong.stdout);
+    let profile = done.dir.path("robots/ripley.yaml").display().to_string();
+    let record = ["--json", "record", &profile, "--recording", "checks"];
+    let rest = [
+        "--source",
+        "dtrack:24993",
+        "--joints",
+        "udp:24994",
+        "--out",
+        "there.csv",
+    ];
+    let ran = dir.calib_with(&[&record[..], &rest].concat()).expect(7);
+    assert_eq!(ran.json()["place"]["file"], "there.csv", "{}", ran.stdout);
+    assert!(ran.json()["remedy"].is_string(), "{}", ran.stdout);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Why a result is not applied, or a file not reverted.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use calib_files::FileError;
 use calib_report::{NotAReport, ReportError, Verdict};
@@ -64,7 +64,7 @@ pub enum ApplyError {
     /// A xacro was not changed, but a YAML that it loads was.
     #[error(
         "{}: it has no change record: its numbers were changed in {}\n  help: revert that file: calib revert {} --in-place",
-        file.display(), yaml.display(), yaml.display()
+        file.display(), yaml.display(), calib_report::shell_path(&yaml.to_string_lossy())
     )]
     RecordedElsewhere {
         /// The xacro.
@@ -194,6 +194,28 @@ impl From<EditError> for ApplyError {
 }
 
 impl ApplyError {
+    /// The file or folder that it is about; `None`: the error inside knows.
+    #[must_use]
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Read(_) | Self::Edit(_) | Self::Unwritable(_) => None,
+            Self::Report(error) => Some(error.path()),
+            Self::File(error) => error.path(),
+            Self::NoResult { path }
+            | Self::NotAccepted { path, .. }
+            | Self::NoRecord { path, .. }
+            | Self::NotARecord { path, .. } => Some(path),
+            Self::NoUrdf { report } => Some(report),
+            Self::RecordedElsewhere { file, .. }
+            | Self::Revert { file, .. }
+            | Self::Stopped { file }
+            | Self::ChangedAlready { file, .. } => Some(file),
+            Self::YamlUnused { target, .. }
+            | Self::PartlyApplied { target, .. }
+            | Self::OtherOrigins { target, .. } => Some(target),
+        }
+    }
+
     /// Whether the result can be read, but should not be applied.
     #[must_use]
     pub fn is_refusal(&self) -> bool {

@@ -21,7 +21,8 @@ fn unified(file: &FileChange) -> String {
 }
 
 fn undo(file: &FileChange, destination: &Destination) -> Option<String> {
-    let written = file.written.as_ref()?.display();
+    let written = file.written.as_ref()?.display().to_string();
+    let written = calib_report::shell_path(&written);
     Some(match destination {
         Destination::InPlace => format!("calib revert {written} --in-place"),
         _ => format!("calib revert {written} --out ORIGINAL"),

@@ -42,8 +42,9 @@ pub fn original(changed: &Path) -> Result<String, ApplyError> {
 pub fn not_reverted(file: &Path) -> Vec<String> {
     let yaml = changed_yaml(file).into_iter();
     yaml.map(|yaml| {
-        let yaml = yaml.display();
-        format!("{yaml} still holds its part of the change: calib revert {yaml} --in-place")
+        let yaml = yaml.display().to_string();
+        let quoted = calib_report::shell_path(&yaml);
+        format!("{yaml} still holds its part of the change: calib revert {quoted} --in-place")
     })
     .collect()
 }

@@ -1,12 +1,13 @@
 //! The file that grows while it is recorded: whole rows, on the disk every second.
 
+use calib_finding::printable_line;
 use calib_recording::{Filled, ReadOptions, Recording, WRITTEN_LIVE, read_bytes};
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Seek, SeekFrom, Write};
 use std::path::Path;
 
-use calib_files::{FileError, input};
+use calib_files::{FileError, cannot_write, input};
 
 use crate::Held;
 
@@ -18,14 +19,16 @@ const EVERY: f64 = 1.0;
 pub enum TableError {
     /// There is a file already.
     #[error(
-        "{path} already exists. Continue it with `--append`, or choose another file with `--out`."
+        "{path} already exists\n  help: continue it with `--append`, or choose another file with `--out`"
     )]
     Exists {
         /// The file.
         path: String,
     },
     /// There is a file, but it is another recording.
-    #[error("{path}: cannot continue this file: {problem}. Choose another file with `--out`.")]
+    #[error(
+        "{path}: cannot continue this file: {problem}\n  help: choose another file with `--out`"
+    )]
     Other {
         /// The file.
         path: String,
@@ -36,13 +39,29 @@ pub enum TableError {
     #[error(transparent)]
     File(#[from] FileError),
     /// The operating system refused.
-    #[error("{path}: cannot be written: {source}")]
+    #[error(
+        "{path}: cannot be written: {source}\n  help: {}",
+        cannot_write(Path::new(path), source)
+    )]
     Io {
         /// The file.
         path: String,
         /// Why.
         source: std::io::Error,
     },
+}
+
+impl TableError {
+    /// The file.
+    #[must_use]
+    pub fn path(&self) -> Option<&Path> {
+        match self {
+            Self::Exists { path } | Self::Other { path, .. } | Self::Io { path, .. } => {
+                Some(Path::new(path))
+            }
+            Self::File(error) => error.path(),
+        }
+    }
 }
 
 /// A place in the file that it can be cut back to.
@@ -90,7 +109,7 @@ impl Table {
         let mut text = String::new();
         for comment in comments.iter().map(String::as_str).chain([WRITTEN_LIVE]) {
             text.push_str("# ");
-            text.push_str(&comment.replace(['\n', '\r'], " "));
+            text.push_str(&printable_line(comment));
             text.push('\n');
         }
         text.push_str(header);

@@ -22,6 +22,9 @@ use calib_urdf::EditError;
 use crate::commands::record::error::RecordError;
 use crate::commands::view::error::ViewError;
 
+/// Where the commands are explained.
+pub const HELP: &str = "`calib help` shows the commands and what they take";
+
 /// Why a command failed.
 #[derive(Debug, thiserror::Error)]
 pub enum CliError {
@@ -265,7 +268,7 @@ impl CliError {
                 Some("look at what `calib check` says; the results are not finite or not whole")
             }
             Self::Capture(_) => None,
-            _ => Some("`calib help` shows the commands and what they take"),
+            _ => Some(HELP),
         }
     }
 }

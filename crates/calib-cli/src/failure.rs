@@ -6,8 +6,8 @@ use std::ffi::OsString;
 use calib_pipeline::ExitCode;
 
 use crate::arguments::Arguments;
-use crate::error::CliError;
 use crate::error::place::Place;
+use crate::error::{CliError, HELP};
 use crate::terminal::{emit, say};
 
 /// Says why a command failed; returns the exit code.
@@ -53,7 +53,7 @@ pub fn misused(error: &clap::Error, arguments: &[OsString]) -> u8 {
     if arguments.iter().any(|argument| argument == "--json") {
         let plain = text.to_string();
         let said = plain.trim().trim_start_matches("error: ");
-        return emit_error(("usage", said), None, None, usage);
+        return emit_error(("usage", said), None, Some(HELP), usage);
     }
     say(text.to_string().trim_end());
     usage

@@ -111,6 +111,14 @@ pub fn say(text: &str) {
     let _ = std::io::stderr().lock().write_all(line.as_bytes());
 }
 
+/// A remark of a command on standard error: a line, or a JSON line.
+pub fn say_note(console: &Console, note: &str) {
+    match console.json {
+        true => say(&serde_json::json!({"note": note}).to_string()),
+        false => say(&format!("calib: {note}")),
+    }
+}
+
 /// The name of a stage as a JSON line on standard error.
 pub fn say_stage(stage: &str) {
     say(&serde_json::json!({"progress": stage}).to_string());

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 
-use calib_report::{number, terminal};
+use calib_report::{number, printable_line, terminal};
 
 use crate::compare::{Changed, Drift};
 use crate::error::DriftError;
@@ -12,7 +12,8 @@ use crate::error::DriftError;
 pub fn text(drift: &Drift) -> String {
     let mut out = String::new();
     // Writing to a String does not fail.
-    let _ = writeln!(out, "{} → {} · {}", drift.old, drift.new, drift.robot);
+    let robot = printable_line(&drift.robot);
+    let _ = writeln!(out, "{} → {} · {robot}", drift.old, drift.new);
     let significant: Vec<&Changed> = drift.numbers.iter().filter(|n| n.significant).collect();
     let (free, entangled): (Vec<&Changed>, Vec<&Changed>) =
         significant.iter().partition(|n| n.gauge_free);

@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use calib_report::plots::{Plot, PlotKind, PlotRow};
-use calib_report::{Unit, number, terminal};
+use calib_report::{Unit, number, printable_line, terminal};
 
 use crate::error::DriftError;
 use crate::history::{Calibration, History, Track, Value};
@@ -41,7 +41,7 @@ pub fn history_text(history: &History) -> String {
     let _ = writeln!(
         out,
         "{} · {}",
-        history.robot,
+        printable_line(&history.robot),
         match history.calibrations.len() {
             1 => "1 calibration".to_owned(),
             n => format!("{n} calibrations"),
@@ -86,7 +86,7 @@ pub fn history_page(history: &History) -> String {
         .map(|track| plot(history, track))
         .collect();
     calib_report::gallery::page(
-        &format!("History of {}", history.robot),
+        &format!("History of {}", printable_line(&history.robot)),
         &lines,
         &plots,
         &[],

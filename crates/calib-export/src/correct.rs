@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use calib_finding::cell;
 use calib_model::{Aim, Approach, Correction, ModelError, Options, Outcome, Pose, Under};
 
 use crate::error::ExportError;
@@ -182,7 +183,7 @@ fn columns(robot: &Robot) -> impl Iterator<Item = (String, bool)> + '_ {
 
 fn header(csv: &mut Csv, robot: &Robot) {
     csv.cell("line");
-    columns(robot).for_each(|(name, _)| csv.cell(&name));
+    columns(robot).for_each(|(name, _)| csv.cell(&cell(&name)));
     [
         "outcome",
         "before_mm",

@@ -37,5 +37,5 @@ pub use error::ExportError;
 pub use export::{Exported, export};
 pub use predict::{Frame, PredictOptions, Predicted, predict};
 pub use read::{Robot, robot, robot_with};
-pub use table::region;
+pub use table::{Region, region};
 pub use target::Target;

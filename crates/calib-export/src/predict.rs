@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use calib_finding::cell;
 use calib_model::{Approach, ModelError, Place, Scope, Under};
 use nalgebra::{Matrix3, Matrix6};
 
@@ -143,7 +144,7 @@ fn header(csv: &mut Csv, places: &[(String, Place)], sigma: bool) {
     csv.cell("scope");
     for (name, _) in places {
         let endings = POSE.iter().chain(SIGMA.iter().filter(|_| sigma));
-        endings.for_each(|ending| csv.cell(&format!("{name}.{ending}")));
+        endings.for_each(|ending| csv.cell(&cell(&format!("{name}.{ending}"))));
     }
     csv.end();
 }

@@ -111,13 +111,25 @@ fn temperatures(poses: &Poses, model: &Model) -> Vec<Vec<f64>> {
     rows
 }
 
+/// Where a robot is used.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Region {
+    /// Joint positions of each posture.
+    pub postures: Vec<Vec<f64>>,
+    /// Joints without a column: they are taken as 0.
+    pub absent: Vec<String>,
+}
+
 /// The postures of a table, without rows that lost a joint.
 ///
 /// # Errors
 /// [`ExportError`].
-pub fn region(path: &Path, robot: &Robot) -> Result<Vec<Vec<f64>>, ExportError> {
+pub fn region(path: &Path, robot: &Robot) -> Result<Region, ExportError> {
     let program = program(path, &robot.model)?;
-    Ok(program.q.into_iter().flatten().collect())
+    Ok(Region {
+        postures: program.q.into_iter().flatten().collect(),
+        absent: program.absent,
+    })
 }
 
 /// Columns of joints are the robot's, in its units.

@@ -43,6 +43,12 @@ pub enum FileError {
         /// The file.
         path: PathBuf,
     },
+    /// A file of the folder of results was replaced by something else, after this program had written it.
+    #[error("{} is not the file any more that this program wrote there\n  help: {}", path.display(), self.remedy())]
+    Replaced {
+        /// The file.
+        path: PathBuf,
+    },
     /// Another program writes there.
     #[error("{}: another run of this program is writing there\n  help: {}", path.display(), self.remedy())]
     Busy {
@@ -87,6 +93,9 @@ impl FileError {
             Self::Foreign { .. } => {
                 "it was not made by this program: choose another folder with --out"
             }
+            Self::Replaced { .. } => {
+                "it would be lost: move it away, or choose another folder with --out"
+            }
             Self::Busy { .. } => "wait until it has ended, or choose another folder with --out",
             Self::Name { .. } => "choose another name",
             Self::SameName { .. } => "give each output of the profile a name of its own",
@@ -105,6 +114,7 @@ impl FileError {
             | Self::Protected { path }
             | Self::Exists { path }
             | Self::Foreign { path }
+            | Self::Replaced { path }
             | Self::Busy { path }
             | Self::OtherState { path, .. } => Some(path),
             Self::Name { .. } | Self::SameName { .. } => None,

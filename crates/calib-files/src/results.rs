@@ -8,7 +8,7 @@
 //! that the next run may replace it; while the list says "unfinished", [`is_unfinished`] tells readers of the folder.
 
 use std::fs::{File, TryLockError};
-use std::io::{self, ErrorKind, Write};
+use std::io::{self, ErrorKind, Read as _, Write};
 use std::path::{Path, PathBuf};
 
 use crate::disk::{self, is_there};
@@ -32,6 +32,8 @@ const LARGEST_MANIFEST: u64 = 1 << 20;
 pub struct ResultsFolder {
     /// Names of files that must not remain from an earlier run.
     outdated: Vec<String>,
+    /// How a file begins that may be replaced by one that begins so.
+    over: Option<String>,
     folder: PathBuf,
     /// The folders that were made, outermost first.
     made: Vec<PathBuf>,
@@ -69,6 +71,7 @@ impl ResultsFolder {
             made,
             lock: None,
             outdated: Vec::new(),
+            over: None,
         };
         done?;
         results.lock = lock(folder)?;
@@ -81,6 +84,14 @@ impl ResultsFolder {
     #[must_use]
     pub fn without(mut self, names: &[&str]) -> Self {
         self.outdated = names.iter().map(|name| (*name).to_owned()).collect();
+        self
+    }
+
+    /// A new file that begins with `start` replaces only a file that begins so too. What somebody else put in the place of a listed file is kept, and
+    /// the call fails.
+    #[must_use]
+    pub fn over(mut self, start: &str) -> Self {
+        self.over = Some(start.to_owned());
         self
     }
 
@@ -111,7 +122,7 @@ impl ResultsFolder {
     /// and the call fails before a name is changed.
     ///
     /// # Errors
-    /// [`FileError::Name`], [`FileError::SameName`], [`FileError::Foreign`] or [`FileError::Write`].
+    /// [`FileError::Name`], [`FileError::SameName`], [`FileError::Foreign`], [`FileError::Replaced`] or [`FileError::Write`].
     pub fn write_with(
         mut self,
         grown: Vec<GrowingFile>,
@@ -127,6 +138,13 @@ impl ResultsFolder {
             let path = folder.join(name);
             if is_there(&path) && !ours.iter().any(|n| n == name) {
                 return Err(FileError::Foreign { path });
+            }
+        }
+        let start = self.over.as_deref().unwrap_or_default().as_bytes();
+        for file in files.iter().filter(|file| file.bytes.starts_with(start)) {
+            let path = folder.join(&file.name);
+            if is_there(&path) && !begins(&path, start) {
+                return Err(FileError::Replaced { path });
             }
         }
         let outdated: Vec<&String> = (self.outdated.iter())
@@ -204,6 +222,13 @@ pub fn write_results(folder: &Path, files: &[OutputFile]) -> Result<Vec<PathBuf>
 pub fn is_unfinished(folder: &Path) -> bool {
     let list = input::read_text(&folder.join(MANIFEST), LARGEST_MANIFEST);
     list.is_ok_and(|text| text.lines().next() == Some(UNFINISHED))
+}
+
+/// Whether a file begins with these bytes; every file begins with none.
+fn begins(path: &Path, start: &[u8]) -> bool {
+    let mut head = vec![0; start.len()];
+    let read = |mut file: File| file.read_exact(&mut head);
+    start.is_empty() || input::open(path).and_then(read).is_ok() && head == start
 }
 
 fn manifest(folder: &Path) -> Vec<String> {

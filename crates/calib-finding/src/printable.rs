@@ -6,33 +6,54 @@ use std::borrow::Cow;
 /// file can move the cursor, set a title or reverse the direction of the text. JSON keeps its meaning.
 #[must_use]
 pub fn printable(text: &str) -> Cow<'_, str> {
-    escaped(text, false)
+    escaped(text, is_harmless, |_| None)
 }
 
-/// [`printable`] for a text with colors of our own: `ESC [ numbers m` stays too.
+/// [`printable`] for a name, which is one line: line breaks and tabs do not stay either.
+#[must_use]
+pub fn printable_line(text: &str) -> Cow<'_, str> {
+    escaped(text, |c| !hides(c), |_| None)
+}
+
+/// [`printable`] for a text with colors of our own: [`STYLES`] stay too.
 #[must_use]
 pub fn printable_in_color(text: &str) -> Cow<'_, str> {
-    escaped(text, true)
+    escaped(text, is_harmless, style)
 }
 
-fn escaped(text: &str, colors: bool) -> Cow<'_, str> {
-    let harmless = |c: char| matches!(c, '\n' | '\t') || !(c.is_control() || redirects(c));
-    if text.chars().all(harmless) {
+/// The sequences that this program styles a text with: the end of a style, bold, and its colors. None of them hides a text.
+pub const STYLES: [&str; 7] = [
+    "\u{1b}[0m",
+    "\u{1b}[1m",
+    "\u{1b}[4m",
+    "\u{1b}[31m",
+    "\u{1b}[32m",
+    "\u{1b}[33m",
+    "\u{1b}[36m",
+];
+
+/// The text with what is not `harmless` escaped; what `kept` finds at the beginning of a rest of it stays.
+fn escaped<'t>(
+    text: &'t str,
+    harmless: impl Fn(char) -> bool,
+    kept: impl Fn(&str) -> Option<&'static str>,
+) -> Cow<'t, str> {
+    if text.chars().all(&harmless) {
         return Cow::Borrowed(text);
     }
     let mut out = String::with_capacity(text.len());
     let mut rest = text;
     while let Some(c) = rest.chars().next() {
-        let length = match color(rest) {
-            Some(length) if colors => {
-                out.push_str(&rest[..length]);
-                length
+        let length = match kept(rest) {
+            Some(style) => {
+                out.push_str(style);
+                style.len()
             }
-            _ if harmless(c) => {
+            None if harmless(c) => {
                 out.push(c);
                 c.len_utf8()
             }
-            _ => {
+            None => {
                 out.push_str(&format!("\\u{:04x}", u32::from(c)));
                 c.len_utf8()
             }
@@ -42,16 +63,19 @@ fn escaped(text: &str, colors: bool) -> Cow<'_, str> {
     Cow::Owned(out)
 }
 
-/// Marks that change the direction of the text after them.
-fn redirects(c: char) -> bool {
-    matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+fn is_harmless(c: char) -> bool {
+    matches!(c, '\n' | '\t') || !hides(c)
 }
 
-/// Length of the color that the text begins with.
-fn color(text: &str) -> Option<usize> {
-    let numbers = text.strip_prefix("\u{1b}[")?;
-    let end = numbers.find(|c: char| !(c.is_ascii_digit() || c == ';'))?;
-    numbers[end..].starts_with('m').then_some(2 + end + 1)
+/// Control characters, separators of lines, and marks that change the direction of the text after them.
+fn hides(c: char) -> bool {
+    c.is_control()
+        || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+/// The style of ours that the text begins with.
+fn style(text: &str) -> Option<&'static str> {
+    STYLES.into_iter().find(|style| text.starts_with(style))
 }
 
 /// What a spreadsheet takes for a formula begins with one of these.
@@ -81,7 +105,7 @@ pub fn from_cell(text: &str) -> &str {
 
 #[cfg(test)]
 mod tests {
-    use super::{cell, from_cell, printable, printable_in_color};
+    use super::{cell, from_cell, printable, printable_in_color, printable_line};
 
     #[test]
     fn a_cell_is_no_formula_and_gives_its_name_back() {
@@ -104,9 +128,14 @@ mod tests {
         assert_eq!(printable(hostile), shown);
         assert_eq!(printable_in_color(hostile), shown);
         assert_eq!(
-            printable_in_color("\u{1b}[1;31mred\u{1b}[0m"),
-            "\u{1b}[1;31mred\u{1b}[0m"
+            printable_in_color("\u{1b}[1m\u{1b}[31mred\u{1b}[0m"),
+            "\u{1b}[1m\u{1b}[31mred\u{1b}[0m"
         );
         assert_eq!(printable("\u{1b}[1mbold"), "\\u001b[1mbold");
+        assert_eq!(printable_in_color("\u{1b}[8mhidden"), "\\u001b[8mhidden");
+        assert_eq!(
+            printable_line("a\nb\t\u{2028}c µ"),
+            "a\\u000ab\\u0009\\u2028c µ"
+        );
     }
 }

@@ -1,5 +1,6 @@
 //! What a finding is about.
 
+use crate::printable_line;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -130,8 +131,8 @@ impl fmt::Display for Subject {
         match (place.is_empty(), about.is_empty()) {
             (true, true) => f.write_str("recording"),
             (true, false) => f.write_str(&about),
-            (false, true) => f.write_str(&place),
-            (false, false) => write!(f, "{place}: {about}"),
+            (false, true) => f.write_str(&printable_line(&place)),
+            (false, false) => write!(f, "{}: {about}", printable_line(&place)),
         }
     }
 }
@@ -147,9 +148,9 @@ impl fmt::Display for About {
             | About::Column(name)
             | About::File(name)
             | About::Origin(name)
-            | About::Parameter(name) => f.write_str(name),
-            About::Markers(names) => f.write_str(&names.join(", ")),
-            About::Hold(name) => write!(f, "hold {name}"),
+            | About::Parameter(name) => f.write_str(&printable_line(name)),
+            About::Markers(names) => f.write_str(&printable_line(&names.join(", "))),
+            About::Hold(name) => write!(f, "hold {}", printable_line(name)),
             About::Time => f.write_str("time"),
             About::Clocks => f.write_str("clocks"),
             About::Lengths => f.write_str("lengths"),

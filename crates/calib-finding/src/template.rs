@@ -4,7 +4,7 @@
 //! number in that unit; `{key} ± {sigma}` for a value with the digits that its standard deviation leaves; `{key:row}` for a count with its noun (`1 row`, `2 rows`). `[[ … ]]` is left out unless every
 //! value in it is known.
 
-use crate::{Fact, Facts, Unit, number};
+use crate::{Fact, Facts, Unit, number, printable_line};
 
 /// What stands where a value is not known.
 const UNKNOWN: &str = "—";
@@ -84,14 +84,17 @@ fn shown(fact: &Fact, form: &str) -> String {
         Fact::Number { value, unit } => lone(*value, *unit, form),
         Fact::Count(count) if form.is_empty() => count.to_string(),
         Fact::Count(count) => format!("{count} {form}{}", if *count == 1 { "" } else { "s" }),
-        Fact::Name(name) => name.to_string(),
-        Fact::Names(names) => match form {
-            "or" => names.join(" or "),
-            "code" => format!("`{}`", names.join("`, `")),
-            "exchange" => names.join(" ↔ "),
-            "list" => format!("[{}]", names.join(", ")),
-            _ => names.join(", "),
-        },
+        Fact::Name(name) => printable_line(name).into_owned(),
+        Fact::Names(names) => {
+            let names: Vec<_> = names.iter().map(|name| printable_line(name)).collect();
+            match form {
+                "or" => names.join(" or "),
+                "code" => format!("`{}`", names.join("`, `")),
+                "exchange" => names.join(" ↔ "),
+                "list" => format!("[{}]", names.join(", ")),
+                _ => names.join(", "),
+            }
+        }
         Fact::Unknown => UNKNOWN.to_owned(),
     }
 }

@@ -1,6 +1,6 @@
 //! Why there is no profile.
 
-use calib_finding::{Unit, number};
+use calib_finding::{Unit, number, shell_path, shell_word};
 use calib_pipeline::PipelineError;
 use calib_pipeline::error::ExitCode;
 use calib_profile::ProfileError;
@@ -197,7 +197,8 @@ pub enum InitError {
     },
     /// Nothing was given to add to a profile.
     #[error(
-        "{file}: no recording was given to add to it\n  help: give recordings: `calib init --edit {file} RECORDING...`"
+        "{file}: no recording was given to add to it\n  help: give recordings: `calib init --edit {} RECORDING...`",
+        shell_path(file)
     )]
     NothingToAdd {
         /// The profile.
@@ -258,13 +259,16 @@ fn instead(found: &Instead) -> String {
 }
 
 fn instead_of_urdf(found: &Instead, file: &str) -> String {
+    let file = shell_path(file);
     let order = format!("`calib init robot.urdf {file}`");
     match found {
         Instead::Recording(_) | Instead::Table(_) => {
             format!("give the URDF of the robot first, then its recordings: {order}")
         }
         Instead::Pairs([first, second]) => format!(
-            "hand-eye calibration needs no URDF: `calib fit handeye {file} --robot {first} --measured {second}`; for a profile give the URDF of the robot first, and a recording of its joints"
+            "hand-eye calibration needs no URDF: `calib fit handeye {file} --robot {} --measured {}`; for a profile give the URDF of the robot first, and a recording of its joints",
+            shell_word(first),
+            shell_word(second)
         ),
         Instead::Binary | Instead::Text => {
             "give the URDF of the robot: an XML file that begins with `<robot name=…>`".to_owned()

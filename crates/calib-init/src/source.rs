@@ -44,7 +44,7 @@ impl Source {
     /// tracker's names of bodies and markers that the profile calls otherwise, by the profile's.
     ///
     /// # Errors
-    /// [`InitError::Recording`] where neither reads it.
+    /// [`InitError::Recording`] where neither reads it, or a name in it is taken.
     pub fn read(
         model: &RobotModel,
         file: &File,
@@ -60,20 +60,14 @@ impl Source {
                 if count > 0 {
                     facts.push(About::JointsByName { count });
                 }
-                Ok(Self::new(model, file, None, recording, facts, renamed))
+                Self::new(model, file, None, recording, facts, renamed)
             }
             (_, Some(guess)) if !guess.joints.is_empty() || has_tracked(&guess.map) => {
                 let recording = mapped(file, &guess.map)?;
-                Ok(Self::new(
-                    model,
-                    file,
-                    Some(guess.map),
-                    recording,
-                    guess.facts,
-                    renamed,
-                ))
+                let facts = guess.facts;
+                Self::new(model, file, Some(guess.map), recording, facts, renamed)
             }
-            (own, _) => Ok(Self::new(model, file, None, own?, Vec::new(), renamed)),
+            (own, _) => Self::new(model, file, None, own?, Vec::new(), renamed),
         }
     }
 
@@ -103,8 +97,8 @@ impl Source {
         mut recording: Recording,
         facts: Vec<About>,
         renamed: &BTreeMap<String, String>,
-    ) -> Self {
-        recording.rename(renamed);
+    ) -> Result<Self, InitError> {
+        recording.rename(renamed)?;
         let joints = recording.joints.iter().map(|s| &s.name);
         let markers = recording.markers.iter().map(|s| &s.name);
         let bodies = recording.bodies.iter().map(|s| &s.name);
@@ -116,14 +110,14 @@ impl Source {
         let mut facts = facts;
         facts.retain(|about| !matches!(about, About::LostByNumber { .. }));
         facts.extend(lost_by_number(&recording));
-        Self {
+        Ok(Self {
             file: file.clone(),
             columns,
             recording,
             facts,
             names,
             renamed: renamed.clone(),
-        }
+        })
     }
 
     /// The same file by another map.
@@ -133,14 +127,14 @@ impl Source {
     pub fn with_columns(&self, model: &RobotModel, columns: ColumnMap) -> Result<Self, InitError> {
         let recording = mapped(&self.file, &columns)?;
         let facts = self.facts.clone();
-        Ok(Self::new(
+        Self::new(
             model,
             &self.file,
             Some(columns),
             recording,
             facts,
             &self.renamed,
-        ))
+        )
     }
 
     /// It has joints of this robot.

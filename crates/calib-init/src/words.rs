@@ -5,7 +5,7 @@ mod known;
 
 pub use known::{next_of_absent, to_check, wrote};
 
-use calib_finding::{Unit, number};
+use calib_finding::{Unit, number, shell_path};
 use calib_recording::{AngleUnit, TimeUnit};
 
 use crate::fact::{About, AngleHow, LengthHow, Residuals, Rival};
@@ -457,6 +457,7 @@ fn corrected(mistake: &Mistake, residuals: &Residuals, equivalent: &[Vec<Mistake
 /// What to do next.
 #[must_use]
 pub fn next(file: &str, simulated: bool, errors: usize) -> String {
+    let file = shell_path(file);
     match (simulated, errors) {
         (true, _) => format!("Next: calib plan {file}"),
         (false, 0) => format!("Next: calib run {file}"),

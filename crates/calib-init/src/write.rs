@@ -76,7 +76,7 @@ impl Page<'_> {
         self.line(&format!("robot: {{name: {name}, urdf: {urdf}}}"));
         self.line("");
         self.comments("", &Place::Tracker);
-        let mut keys = vec!["frame: tracker".to_owned()];
+        let mut keys = vec![format!("frame: {}", yaml::text(&self.tracker_frame()))];
         if let Some(sigma) = proposal.noise.marker {
             keys.push(format!(
                 "marker_sigma_mm: {}",
@@ -92,6 +92,19 @@ impl Page<'_> {
             keys.push(format!("body_sigma_deg: {}", yaml::two_digits(degrees)));
         }
         self.line(&format!("tracker: {{{}}}", keys.join(", ")));
+    }
+
+    /// A name that no link and no body has.
+    fn tracker_frame(&self) -> String {
+        let bodies = || self.proposal.bodies.iter().map(|body| &body.name);
+        let taken = |name: &String| {
+            self.model.link_id(name).is_ok() || bodies().any(|body| body == name)
+        };
+        let mut name = "tracker".to_owned();
+        while taken(&name) {
+            name.push_str("_frame");
+        }
+        name
     }
 
     fn bodies(&mut self) {

@@ -1,6 +1,6 @@
 //! Why there is no plan.
 
-use calib_finding::number;
+use calib_finding::{number, shell_path};
 use calib_pipeline::{ExitCode, PipelineError};
 
 use crate::candidates::Counts;
@@ -177,7 +177,8 @@ pub enum PlanError {
     },
     /// A plan was made for another robot.
     #[error(
-        "{file}: the plan is for `{planned}`, {profile} describes `{robot}`\n  help: give the plan of this robot: `calib plan {profile}`"
+        "{file}: the plan is for `{planned}`, {profile} describes `{robot}`\n  help: give the plan of this robot: `calib plan {}`",
+        shell_path(profile)
     )]
     OtherRobot {
         /// The plan.
@@ -199,7 +200,8 @@ pub enum PlanError {
     },
     /// Postures of a plan are outside the ranges that hold now.
     #[error(
-        "{file}: a posture is outside the range that joint `{joint}` has now\n  help: plan again: `calib plan {profile}`"
+        "{file}: a posture is outside the range that joint `{joint}` has now\n  help: plan again: `calib plan {}`",
+        shell_path(profile)
     )]
     OutsideRanges {
         /// The plan.
@@ -211,7 +213,7 @@ pub enum PlanError {
     },
     /// Postures of a plan are not possible now.
     #[error(
-        "{file}: {} of {} postures are no longer possible: {}\n  help: plan again: `calib plan {profile}`", counts.tried - counts.feasible, counts.tried, words::removed(counts)
+        "{file}: {} of {} postures are no longer possible: {}\n  help: plan again: `calib plan {}`", counts.tried - counts.feasible, counts.tried, words::removed(counts), shell_path(profile)
     )]
     Impossible {
         /// The plan.
@@ -223,7 +225,7 @@ pub enum PlanError {
     },
     /// A plan was made of something else than is there now.
     #[error(
-        "{file}: the plan expects {}, its postures now reach {}: the profile, the robot or the recordings have changed since\n  help: plan again: `calib plan {profile}`. Where the recording itself was part of the plan, record into another file with `--out`.", words::sigma_of(*then), words::sigma_of(*now)
+        "{file}: the plan expects {}, its postures now reach {}: the profile, the robot or the recordings have changed since\n  help: plan again: `calib plan {}`. Where the recording itself was part of the plan, record into another file with `--out`.", words::sigma_of(*then), words::sigma_of(*now), shell_path(profile)
     )]
     Outdated {
         /// The plan.

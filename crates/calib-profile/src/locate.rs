@@ -2,6 +2,7 @@
 
 use std::fmt;
 
+use calib_finding::printable_line;
 use serde::Deserialize;
 use serde::de::{Deserializer, MapAccess, SeqAccess, Visitor};
 use serde_saphyr::Spanned;
@@ -79,6 +80,30 @@ impl Places {
         }
         found
     }
+
+    /// Keys and texts with characters that a reader would not see: control characters, line breaks in names, and marks that turn the direction of a
+    /// text around.
+    #[must_use]
+    pub fn hidden(&self) -> Vec<(Place, char)> {
+        let mut found = Vec::new();
+        let Some(Kind::Map(entries)) = self.0.as_ref().map(|tree| &tree.kind) else {
+            return found;
+        };
+        for (key, tree) in entries {
+            // What is no name may have lines.
+            let lines = matches!(key.value.as_str(), "identification" | "plugins");
+            found.extend(hidden_in(&key.value, false).map(|c| (place_of(key), c)));
+            tree.collect_hidden(lines, &mut found);
+        }
+        found
+    }
+}
+
+/// The first character of a text that would not be seen; `lines`: line breaks and tabs may be in it.
+fn hidden_in(text: &str, lines: bool) -> Option<char> {
+    let shown = |c: &char| printable_line(c.encode_utf8(&mut [0; 4])) == c.to_string();
+    let mut letters = text.chars();
+    letters.find(|c| !(shown(c) || lines && matches!(c, '\n' | '\r' | '\t')))
 }
 
 struct Tree {
@@ -89,6 +114,7 @@ struct Tree {
 enum Kind {
     Leaf,
     NotFinite,
+    Text(String),
     List(Vec<Tree>),
     Map(Vec<(Spanned<String>, Tree)>),
 }
@@ -96,12 +122,26 @@ enum Kind {
 impl Tree {
     fn collect_not_finite(&self, found: &mut Vec<Place>) {
         match &self.kind {
-            Kind::Leaf => {}
+            Kind::Leaf | Kind::Text(_) => {}
             Kind::NotFinite => found.push(self.place),
             Kind::List(items) => items.iter().for_each(|t| t.collect_not_finite(found)),
             Kind::Map(entries) => entries
                 .iter()
                 .for_each(|(_, t)| t.collect_not_finite(found)),
+        }
+    }
+
+    fn collect_hidden(&self, lines: bool, found: &mut Vec<(Place, char)>) {
+        match &self.kind {
+            Kind::Leaf | Kind::NotFinite => {}
+            Kind::Text(text) => found.extend(hidden_in(text, lines).map(|c| (self.place, c))),
+            Kind::List(items) => items.iter().for_each(|t| t.collect_hidden(lines, found)),
+            Kind::Map(entries) => {
+                for (key, tree) in entries {
+                    found.extend(hidden_in(&key.value, false).map(|c| (place_of(key), c)));
+                    tree.collect_hidden(lines, found);
+                }
+            }
         }
     }
 
@@ -119,7 +159,7 @@ impl Tree {
             found
         };
         match &self.kind {
-            Kind::Leaf | Kind::NotFinite => false,
+            Kind::Leaf | Kind::NotFinite | Kind::Text(_) => false,
             Kind::List(items) => {
                 let mut items = items.iter().enumerate();
                 items.any(|(i, tree)| under(i.to_string(), tree))
@@ -134,7 +174,7 @@ impl Tree {
 
     fn child(&self, step: &str) -> Option<&Self> {
         match &self.kind {
-            Kind::Leaf | Kind::NotFinite => None,
+            Kind::Leaf | Kind::NotFinite | Kind::Text(_) => None,
             Kind::List(items) => items.get(step.parse::<usize>().ok()?),
             Kind::Map(entries) => entries.iter().find(|e| e.0.value == step).map(|e| &e.1),
         }
@@ -210,8 +250,8 @@ impl<'de> Visitor<'de> for KindVisitor {
         })
     }
 
-    fn visit_str<E>(self, _: &str) -> Result<Kind, E> {
-        Ok(Kind::Leaf)
+    fn visit_str<E>(self, text: &str) -> Result<Kind, E> {
+        Ok(Kind::Text(text.to_owned()))
     }
 
     fn visit_unit<E>(self) -> Result<Kind, E> {

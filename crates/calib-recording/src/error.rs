@@ -254,6 +254,24 @@ pub enum Problem {
         /// The nearest id.
         nearest: Option<String>,
     },
+    /// Something is to get a name that something else has and keeps.
+    #[error("`{from}` is to be called `{name}`, and the recording has another `{name}`")]
+    NameTaken {
+        /// The new name.
+        name: String,
+        /// The name in the recording.
+        from: String,
+    },
+    /// No body and no marker has the name that is to be another.
+    #[error("no body and no marker is called `{name}`{}", did_you_mean(.nearest))]
+    NoSuchName {
+        /// The name that was asked for.
+        name: String,
+        /// The nearest one.
+        nearest: Option<String>,
+        /// All names of the recording.
+        known: Vec<String>,
+    },
     /// The format is known, this dialect of it is not supported.
     #[error("{what} is not supported")]
     Unsupported {
@@ -312,6 +330,20 @@ impl Problem {
             }
             Problem::UnknownReader { .. } => {
                 "name one of these, or leave it out: the content tells"
+            }
+            Problem::NameTaken { name, .. } => {
+                return format!(
+                    "map `{name}` to another name too (two names can be exchanged), or leave it out (`names` of the profile, `--map`)"
+                );
+            }
+            Problem::NoSuchName { known, .. } if known.is_empty() => {
+                "leave it out: the recording has joints only"
+            }
+            Problem::NoSuchName { known, .. } => {
+                return format!(
+                    "write the name that the recording has: {}",
+                    known.join(", ")
+                );
             }
             Problem::Unsupported { remedy, .. } => remedy,
         };

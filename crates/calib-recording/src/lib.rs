@@ -31,6 +31,7 @@ mod model;
 mod placeholder;
 mod poses;
 pub mod readers;
+mod rename;
 mod table;
 mod text;
 mod units;
@@ -43,6 +44,7 @@ pub use model::{
 };
 pub use poses::{NotOneTable, Poses};
 pub use readers::{ReadOptions, RotationForm, read_bytes, read_path, read_path_with};
+pub use rename::renamed_comment;
 pub use table::{
     NotWritten, WRITTEN_LIVE, WriteOptions, write_mapped, write_poses, write_recording,
 };

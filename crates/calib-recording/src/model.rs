@@ -2,7 +2,7 @@
 
 use calib_finding::Finding;
 use nalgebra::{Isometry3, Matrix6, Point3};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Everything that one file says: streams of joints, torques, temperatures, bodies and markers, in SI, each with its clock.
 ///
@@ -23,32 +23,6 @@ pub struct Recording {
     pub bodies: Vec<BodyStream>,
     /// Single markers.
     pub markers: Vec<MarkerStream>,
-}
-
-impl Recording {
-    /// Calls bodies and markers by other names: new name → name in the recording. A name that the recording does not have, and one
-    /// whose new name it has already, stay as they are; what was renamed is among the conversions.
-    pub fn rename(&mut self, names: &BTreeMap<String, String>) {
-        let bodies = self.bodies.iter().map(|b| &b.name);
-        let markers = self.markers.iter().map(|m| &m.name);
-        let there: BTreeSet<String> = bodies.chain(markers).cloned().collect();
-        let new: BTreeMap<&String, &String> = names
-            .iter()
-            .filter(|(new, old)| there.contains(*old) && !there.contains(*new))
-            .map(|(new, old)| (old, new))
-            .collect();
-        let bodies = self.bodies.iter_mut().map(|b| &mut b.name);
-        let markers = self.markers.iter_mut().map(|m| &mut m.name);
-        for name in bodies.chain(markers) {
-            if let Some(new) = new.get(name) {
-                let note = format!("`{new}` is the tracker's `{name}`");
-                if !self.meta.conversions.contains(&note) {
-                    self.meta.conversions.push(note);
-                }
-                name.clone_from(new);
-            }
-        }
-    }
 }
 
 /// Where a recording comes from and what was done to it on the way in.

@@ -61,7 +61,7 @@ pub mod view3d;
 mod weak;
 mod words;
 
-pub use calib_finding::{Finding, Severity, Unit, number};
+pub use calib_finding::{Finding, Severity, Unit, number, printable_line, shell_path};
 pub use check::{BodyNoise, CheckOutcome, Checked, CheckedRecording, DataCheck, DataChecks};
 pub use component::{Component, PluginFile};
 pub use contact_point::ContactPoint;

@@ -13,6 +13,7 @@ mod weak;
 use crate::table::Table;
 use crate::words::prose::code;
 use crate::{Report, Unit, number};
+use calib_finding::printable;
 
 /// A part of the report under one heading.
 #[derive(Debug, Clone)]
@@ -112,7 +113,7 @@ impl Page {
     fn code(&mut self, language: &'static str, text: &str) {
         self.push(Block::Code(
             language,
-            text.trim_end_matches('\n').to_owned(),
+            printable(text.trim_end_matches('\n')).into_owned(),
         ));
     }
 }

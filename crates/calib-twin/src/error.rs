@@ -19,7 +19,8 @@ pub enum TwinError {
     NoTrials,
     /// A plan for another robot.
     #[error(
-        "{file}: the plan is for `{planned}`, the profile for `{robot}`\n  help: plan with this profile: `calib plan {file}`"
+        "{file}: the plan is for `{planned}`, the profile for `{robot}`\n  help: plan with this profile: `calib plan {}`",
+        calib_finding::shell_path(file)
     )]
     OtherRobot {
         /// The profile.
@@ -55,7 +56,7 @@ pub enum TwinError {
     },
     /// A folder of results whose profile is elsewhere.
     #[error(
-        "{folder}: the profile `{profile}` that it was made from is not there, or was changed\n  help: give the profile itself: `calib twin path/to/{profile}`"
+        "{folder}: the profile `{profile}` that it was made from is not there, or was changed\n  help: give the profile itself: `calib twin {}`", calib_finding::shell_path(&format!("path/to/{profile}"))
     )]
     NoProfile {
         /// The folder.

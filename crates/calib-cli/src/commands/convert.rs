@@ -1,5 +1,6 @@
 //! `calib convert`.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use calib_files::{OutputFile, write_new};
@@ -7,13 +8,15 @@ use calib_pipeline::ExitCode;
 use calib_pipeline::error::PipelineError;
 use calib_pipeline::prepare::{estimators::Estimators, readers};
 use calib_plugin::{Origin, typed};
-use calib_recording::{ReadOptions, Recording, WriteOptions, read_path_with, write_recording};
+use calib_recording::{
+    ReadOptions, Recording, WriteOptions, read_path_with, renamed_comment, write_recording,
+};
 use clap::Args;
 
 use super::names::names_of;
 use super::plugin_options::NamedPlugins;
 use crate::error::CliError;
-use crate::terminal::{Console, byte_bar, emit_paths, say};
+use crate::terminal::{Console, byte_bar, emit_paths, say_note};
 
 /// Arguments of `calib convert`.
 #[derive(Debug, Args)]
@@ -44,7 +47,7 @@ pub fn run(console: &Console, options: &Convert) -> Result<ExitCode, CliError> {
     bar.finish_and_clear();
     let converted = converted?;
     for note in &converted.notes {
-        say(&format!("calib: {note}"));
+        say_note(console, note);
     }
     emit_paths(
         console.json,
@@ -112,7 +115,7 @@ fn convert(options: &Convert, progress: &mut dyn FnMut(u64, u64)) -> Result<Conv
             read_path_with(input, &options, progress)?
         }
     };
-    recording.rename(&names);
+    recording.rename_all(&names)?;
     let mut notes = vec![format!("read as {}", recording.meta.format)];
     notes.extend(recording.meta.conversions.iter().cloned());
     notes.extend(
@@ -122,13 +125,15 @@ fn convert(options: &Convert, progress: &mut dyn FnMut(u64, u64)) -> Result<Conv
             .iter()
             .map(|f| format!("{}: {}", f.id, f.text())),
     );
-    let tables = write_recording(&recording, &WriteOptions::default()).map_err(|source| {
-        CliError::Table {
-            file: input.display().to_string(),
-            source,
-            remedy: "rename the columns that a table cannot hold",
-            code: ExitCode::Data,
-        }
+    let options = WriteOptions {
+        comments: renamed(&recording, &names),
+        ..WriteOptions::default()
+    };
+    let tables = write_recording(&recording, &options).map_err(|source| CliError::Table {
+        file: input.display().to_string(),
+        source,
+        remedy: "rename the columns that a table cannot hold",
+        code: ExitCode::Data,
     })?;
     let name = output.file_name().map_or_else(
         || "recording.csv".to_owned(),
@@ -156,4 +161,12 @@ fn convert(options: &Convert, progress: &mut dyn FnMut(u64, u64)) -> Result<Conv
         files,
         notes,
     })
+}
+
+/// What is to be said above the tables of names that are not the tracker's any more, so that nobody maps them a second time.
+fn renamed(recording: &Recording, names: &BTreeMap<String, String>) -> Vec<String> {
+    let of_file = recording.meta.renamed_comments();
+    let mapped = names.iter().filter(|(name, from)| name != from);
+    let mapped = mapped.map(|(name, from)| renamed_comment(name, from));
+    of_file.chain(mapped).collect()
 }

@@ -9,7 +9,7 @@ use clap::Args;
 use super::plugin_options::Evaluated;
 use super::predict::{say_absent, say_assumed, write};
 use crate::error::CliError;
-use crate::terminal::{Console, say};
+use crate::terminal::{Console, say_note};
 
 /// Arguments of `calib correct`.
 #[derive(Debug, Args)]
@@ -60,10 +60,10 @@ pub fn run(console: &Console, options: &Correct) -> Result<ExitCode, CliError> {
     with_plugins.evaluated()?;
     if !console.quiet {
         if !done.cartesian || done.absent.len() < robot.model.joints().len() {
-            say_absent(&done.absent);
+            say_absent(console, &done.absent);
         }
-        say_assumed(done.assumed_temperature_c);
-        say(&summary(&done));
+        say_assumed(console, done.assumed_temperature_c);
+        say_note(console, &summary(&done));
     }
     write(console, options.out.as_ref(), &done.csv)?;
     Ok(match done.refused {
@@ -76,7 +76,7 @@ pub fn run(console: &Console, options: &Correct) -> Result<ExitCode, CliError> {
 fn summary(done: &Corrected) -> String {
     let mm = |m: f64| format!("{:.3}", 1e3 * m);
     let mut text = format!(
-        "calib: {} of {} rows reached; tool error by the model {} mm rms before, {} mm after",
+        "{} of {} rows reached; tool error by the model {} mm rms before, {} mm after",
         done.reached,
         done.rows,
         mm(done.before_m[0]),

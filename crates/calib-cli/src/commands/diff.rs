@@ -7,7 +7,7 @@ use calib_pipeline::ExitCode;
 use clap::{Args, ValueEnum};
 
 use crate::error::CliError;
-use crate::terminal::{emit, emit_raw};
+use crate::terminal::{Console, emit, emit_raw};
 
 /// Arguments of `calib diff`.
 #[derive(Debug, Args)]
@@ -16,9 +16,9 @@ pub struct Diff {
     a: PathBuf,
     /// Second file
     b: PathBuf,
-    /// Output format
-    #[arg(long, value_enum, default_value_t = DiffFormat::Table)]
-    format: DiffFormat,
+    /// Output format [default: table, with --json json]
+    #[arg(long, value_enum)]
+    format: Option<DiffFormat>,
 }
 
 /// Renderings of a difference.
@@ -33,13 +33,19 @@ enum DiffFormat {
 }
 
 /// Prints the difference.
-pub fn run(options: &Diff) -> Result<ExitCode, CliError> {
-    let text = match options.format {
+pub fn run(console: &Console, options: &Diff) -> Result<ExitCode, CliError> {
+    let format = options.format.unwrap_or(match console.json {
+        true => DiffFormat::Json,
+        false => DiffFormat::Table,
+    });
+    let text = match format {
         DiffFormat::Table => diff_table(&options.a, &options.b)?,
         DiffFormat::Json => diff_json(&options.a, &options.b)?,
         DiffFormat::Unified => diff_unified(&options.a, &options.b)?,
     };
-    match options.format {
+    match format {
+        DiffFormat::Json => emit(&text)?,
+        _ if console.json => emit(&format!("{}\n", serde_json::json!({"text": text})))?,
         // A patch has to have the bytes of its files.
         DiffFormat::Unified => emit_raw(&text)?,
         _ => emit(&text)?,

@@ -7,9 +7,9 @@ use calib_pipeline::ExitCode;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
-use super::predict::write;
+use super::predict::{say_absent, write};
 use crate::error::CliError;
-use crate::terminal::{Console, say};
+use crate::terminal::{Console, say_note};
 
 /// Arguments of `calib export`.
 #[derive(Debug, Args)]
@@ -41,21 +41,26 @@ fn formats() -> impl TypedValueParser<Value = Target> {
 /// Writes the robot in another format.
 pub fn run(console: &Console, options: &Export) -> Result<ExitCode, CliError> {
     let robot = robot(&options.model)?;
-    let rows = match &options.region {
+    let region = match &options.region {
         Some(table) => Some(region(table, &robot)?),
         None => None,
     };
-    let done = export(&robot, options.to, options.tool.as_deref(), rows.as_deref())?;
+    let rows = region.as_ref().map(|region| region.postures.as_slice());
+    let done = export(&robot, options.to, options.tool.as_deref(), rows)?;
+    if let Some(region) = region.as_ref().filter(|_| !console.quiet) {
+        say_absent(console, &region.absent);
+    }
     if !console.quiet && !done.lost.is_empty() {
-        say(&format!(
-            "calib: {} cannot hold {}: {} is off by {:.3} mm rms, {:.3} mm at most, at {} postures",
+        let note = format!(
+            "{} cannot hold {}: {} is off by {:.3} mm rms, {:.3} mm at most, at {} postures",
             options.to.name(),
             done.lost.join(", "),
             done.tool,
             1e3 * done.cost.rms_m,
             1e3 * done.cost.largest_m,
             done.cost.postures
-        ));
+        );
+        say_note(console, &note);
     }
     write(console, options.out.as_ref(), &done.text)
 }

@@ -7,7 +7,7 @@ use calib_pipeline::ExitCode;
 use clap::Args;
 
 use crate::error::CliError;
-use crate::terminal::{emit, say};
+use crate::terminal::{Console, emit, emit_written};
 
 /// Arguments of `calib history`.
 #[derive(Debug, Args)]
@@ -24,9 +24,9 @@ pub struct History {
 }
 
 /// Shows a robot's quantities over time.
-pub fn run(options: &History) -> Result<ExitCode, CliError> {
+pub fn run(console: &Console, options: &History) -> Result<ExitCode, CliError> {
     let history = calib_drift::history(&options.results)?;
-    emit(&if options.json {
+    emit(&if options.json || console.json {
         calib_drift::history_json(&history)?
     } else {
         calib_drift::history_text(&history)
@@ -35,7 +35,11 @@ pub fn run(options: &History) -> Result<ExitCode, CliError> {
         let name = out.file_name().unwrap_or_default().to_string_lossy();
         let page = calib_drift::history_page(&history);
         write_new(folder_of(out), &[OutputFile::text(name, page)])?;
-        say(&format!("calib: wrote {}", out.display()));
+        let console = Console {
+            json: options.json || console.json,
+            ..*console
+        };
+        emit_written(&console, out);
     }
     Ok(ExitCode::Accepted)
 }

@@ -10,9 +10,10 @@ use calib_pipeline::ExitCode;
 use calib_plugin::check::{Conformance, End, Limits, Outcome, Row, Step, check, check_told};
 use calib_plugin::{Host, SearchPath};
 
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 
 use crate::error::CliError;
+use crate::error::place::Place;
 use crate::terminal::{emit, emit_raw, say};
 
 /// Prints what the tests of a plugin found.
@@ -25,11 +26,14 @@ pub fn run(json: bool, plugin: &str) -> Result<ExitCode, CliError> {
     let conformance = conformance.unwrap_or_else(|| check(&host(), plugin, &Limits::default()));
     if json {
         let rows: Vec<_> = conformance.rows.iter().map(row_json).collect();
-        let all = json!({
+        let mut all = json!({
             "plugin": conformance.plugin,
             "passed": conformance.passed(),
             "tests": rows,
         });
+        if let (Some(failed), Some(all)) = (failed(&conformance), all.as_object_mut()) {
+            all.extend(failed);
+        }
         emit(&format!("{all:#}\n"))?;
     } else {
         emit(&format!("{}\n", conformance.to_string().trim_end()))?;
@@ -41,6 +45,23 @@ pub fn run(json: bool, plugin: &str) -> Result<ExitCode, CliError> {
         say(help(&conformance));
     }
     Ok(ExitCode::Plugin)
+}
+
+/// The keys of an error; `None` where nothing failed.
+fn failed(conformance: &Conformance) -> Option<Map<String, Value>> {
+    let rows = &conformance.rows;
+    let first = rows.iter().find(|row| row.outcome == Outcome::Failed)?;
+    let keys = json!({
+        "error": format!("{}: {}: {}", first.subject, first.test, first.detail),
+        "id": "plugin",
+        "place": Place::of(&conformance.plugin),
+        "remedy": help(conformance).trim_start_matches("  help: "),
+        "exit_code": ExitCode::Plugin as u8,
+    });
+    match keys {
+        Value::Object(keys) => Some(keys),
+        _ => None,
+    }
 }
 
 /// Makes the tests in this process and prints each step.

@@ -6,10 +6,11 @@ use calib_export::{Frame, PredictOptions, predict};
 use calib_files::{OutputFile, folder_of, write_new};
 use calib_pipeline::ExitCode;
 use clap::{Args, ValueEnum};
+use serde_json::json;
 
 use super::plugin_options::Evaluated;
 use crate::error::CliError;
-use crate::terminal::{Console, emit, emit_written, say};
+use crate::terminal::{Console, emit, emit_paths, emit_written, say_note};
 
 /// Arguments of `calib predict`.
 #[derive(Debug, Args)]
@@ -62,54 +63,60 @@ pub fn run(console: &Console, options: &Predict) -> Result<ExitCode, CliError> {
     let done = predict(&robot.robot, &options.table, &with)?;
     robot.evaluated()?;
     if !console.quiet {
-        say_absent(&done.absent);
-        say_assumed(done.assumed_temperature_c);
+        say_absent(console, &done.absent);
+        say_assumed(console, done.assumed_temperature_c);
         for (link, own) in &done.renamed {
-            say(&format!(
-                "calib: `{link}` is the link; the body or point of the same name is `{own}`, as in the scene"
-            ));
+            let note = format!(
+                "`{link}` is the link; the body or point of the same name is `{own}`, as in the scene"
+            );
+            say_note(console, &note);
         }
         if done.outside > 0 {
-            say(&format!(
-                "calib: {} of {} rows are outside of the range that was fitted: nothing was verified there",
+            let note = format!(
+                "{} of {} rows are outside of the range that was fitted: nothing was verified there",
                 done.outside, done.rows
-            ));
+            );
+            say_note(console, &note);
         }
     }
     write(console, options.out.as_ref(), &done.csv)
 }
 
 /// The temperature that the robot was taken to have.
-pub(super) fn say_assumed(celsius: Option<f64>) {
+pub(super) fn say_assumed(console: &Console, celsius: Option<f64>) {
     if let Some(celsius) = celsius {
-        say(&format!(
-            "calib: the table has no temperature (`temperature_c`), and lengths of this robot follow it: they are those at {celsius} °C"
-        ));
+        let note = format!(
+            "the table has no temperature (`temperature_c`), and lengths of this robot follow it: they are those at {celsius} °C"
+        );
+        say_note(console, &note);
     }
 }
 
 /// Joints without a column.
-pub(super) fn say_absent(absent: &[String]) {
+pub(super) fn say_absent(console: &Console, absent: &[String]) {
     if !absent.is_empty() {
-        say(&format!(
-            "calib: joints without a column count as 0: {}",
-            absent.join(", ")
-        ));
+        let absent = absent.join(", ");
+        let note = format!("joints without a column count as 0: {absent}");
+        say_note(console, &note);
     }
 }
 
-/// A result to its file, or to standard output.
+/// A result to its file, or to standard output: as it is, or as the text in JSON.
 pub(super) fn write(
     console: &Console,
     out: Option<&PathBuf>,
     text: &str,
 ) -> Result<ExitCode, CliError> {
     match out {
+        None if console.json => emit(&format!("{}\n", json!({"text": text})))?,
         None => emit(text)?,
         Some(path) => {
             let name = path.file_name().unwrap_or_default().to_string_lossy();
             write_new(folder_of(path), &[OutputFile::text(name, text)])?;
-            emit_written(console, path);
+            match console.json {
+                true => emit_paths(true, std::slice::from_ref(path))?,
+                false => emit_written(console, path),
+            }
         }
     }
     Ok(ExitCode::Accepted)

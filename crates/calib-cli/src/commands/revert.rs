@@ -6,7 +6,7 @@ use calib_pipeline::ExitCode;
 use clap::Args;
 
 use crate::error::CliError;
-use crate::terminal::{Console, emit_paths, say};
+use crate::terminal::{Console, emit_paths, say, say_note};
 
 /// Arguments of `calib revert`.
 #[derive(Debug, Args)]
@@ -28,7 +28,10 @@ pub fn run(console: &Console, options: &Revert) -> Result<ExitCode, CliError> {
         None => calib_apply::revert_in_place(&options.file)?,
     };
     for note in calib_apply::not_reverted(&options.file) {
-        say(&format!("note: {note}"));
+        match console.json {
+            true => say_note(console, &note),
+            false => say(&format!("note: {note}")),
+        }
     }
     emit_paths(console.json, &[written])?;
     Ok(ExitCode::Accepted)

@@ -8,7 +8,9 @@ use calib_pipeline::ExitCode;
 use calib_pipeline::prepare::load::{RobotProfile, load_robot};
 use calib_plan::PlanError;
 use calib_profile::{RecordingSpec, Usage};
-use calib_recording::{ColumnMap, NotWritten, Poses, WriteOptions, write_mapped, write_poses};
+use calib_recording::{
+    ColumnMap, NotWritten, Poses, WriteOptions, renamed_comment, write_mapped, write_poses,
+};
 use calib_urdf::range::resting_positions;
 use clap::Args;
 
@@ -39,7 +41,7 @@ pub struct Simulate {
 /// Simulates, and prints the names of the files.
 pub fn run(console: &Console, options: &Simulate) -> Result<ExitCode, CliError> {
     let robot = load_robot(&options.profile)?;
-    let folder = ResultsFolder::open(&options.out)?;
+    let folder = ResultsFolder::open(&options.out)?.over(&format!("# {SIMULATED}"));
     let postures = match &options.plan {
         Some(path) => postures(&robot, path)?,
         None => BTreeMap::new(),
@@ -74,13 +76,7 @@ fn simulate(
             None => poses.clone(),
         };
         let options = WriteOptions {
-            comments: vec![
-                format!(
-                    "simulated by `calib simulate {}` with seed {}; the truth is in truth.json",
-                    robot.file, simulated.truth.seed
-                ),
-                format!("recording {name} of {}", robot.profile.robot),
-            ],
+            comments: comments(robot, name, simulated.truth.seed),
             degrees: true,
             ..WriteOptions::micro()
         };
@@ -123,6 +119,24 @@ fn simulate(
     truth.push('\n');
     files.push(OutputFile::text("truth.json", truth));
     Ok(files)
+}
+
+/// How the first comment of a simulated table begins: such a file is no measurement, and may be simulated again.
+const SIMULATED: &str = "simulated by `calib simulate ";
+
+/// Lines above a simulated table, which has the profile's names.
+fn comments(robot: &RobotProfile, recording: &str, seed: u64) -> Vec<String> {
+    let profile = &robot.profile;
+    let mut comments = vec![
+        format!(
+            "{SIMULATED}{}` with seed {seed}; the truth is in truth.json",
+            robot.file
+        ),
+        format!("recording {recording} of {}", profile.robot),
+    ];
+    let others = profile.names.iter().filter(|(name, from)| name != from);
+    comments.extend(others.map(|(name, from)| renamed_comment(name, from)));
+    comments
 }
 
 /// A table as the profile reads it: with the names and units of its column map, where it has one.

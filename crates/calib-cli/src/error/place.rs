@@ -3,9 +3,11 @@
 use std::path::Path;
 
 use calib_apply::ApplyError;
+use calib_capture::CaptureError;
 use calib_drift::DriftError;
 use calib_export::ExportError;
 use calib_files::FileError;
+use calib_fit::FitError;
 use calib_fleet::FleetError;
 use calib_init::InitError;
 use calib_pipeline::PipelineError;
@@ -15,6 +17,7 @@ use calib_twin::TwinError;
 use serde::Serialize;
 
 use super::CliError;
+use crate::commands::view::error::ViewError;
 
 /// Where an error is.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
@@ -28,7 +31,8 @@ pub struct Place {
 }
 
 impl Place {
-    fn of(file: impl Into<String>) -> Self {
+    /// A file or folder as a whole.
+    pub fn of(file: impl Into<String>) -> Self {
         Self {
             file: file.into(),
             line: None,
@@ -116,7 +120,12 @@ impl CliError {
             Self::Twin(error) => Place::of(error.file()?.to_owned()),
             Self::Plan(error) => Place::of(error.file()?.to_owned()),
             Self::Apply(ApplyError::Read(error)) => place_of_urdf(error)?,
-            Self::Apply(ApplyError::File(error)) | Self::File(error) => place_of_file(error)?,
+            Self::Apply(error) => Place::path(error.path()?),
+            Self::File(error) => place_of_file(error)?,
+            Self::Fit(FitError::Recording(error)) => place_of_recording(error),
+            Self::Fit(FitError::Data { file, .. }) => Place::of(file.clone()),
+            Self::View(ViewError::NoReport { path }) => Place::path(path),
+            Self::Capture(CaptureError::Table(error)) => Place::path(error.path()?),
             Self::Fleet(FleetError::Store(error)) => Place::of(error.url.clone()),
             Self::Fleet(error) => Place::path(error.path()?),
             Self::Batch(error) => Place::path(error.path()?),
@@ -129,7 +138,6 @@ impl CliError {
                     ..Place::of(file)
                 }
             }
-            Self::Apply(ApplyError::Report(error)) => Place::path(error.path()),
             Self::Recording(error) => place_of_recording(error),
             Self::Table { file, .. } | Self::Simulation { file, .. } => Place::of(file.clone()),
             _ => return None,
@@ -183,7 +191,9 @@ fn of_file(error: &FileError) -> &'static str {
         FileError::Busy { .. } => "folder-busy",
         FileError::Name { .. } | FileError::SameName { .. } => "file-name",
         FileError::Protected { .. } => "write-protected",
-        FileError::Exists { .. } | FileError::Foreign { .. } => "file-exists",
+        FileError::Exists { .. } | FileError::Foreign { .. } | FileError::Replaced { .. } => {
+            "file-exists"
+        }
         FileError::OtherState { .. } => "other-state",
         _ => "file-not-written",
     }

@@ -55,4 +55,10 @@ super::topic! {
             "The column map does not mention {columns}, and the robot has no joint of that name; ignored.",
             "Map the column if it matters.";
     }
+    /// A name of the tracker that the profile states, and that no recording has.
+    TRACKER_NAME_UNUSED = "tracker-name-unused" {
+        "": Info,
+            "The profile says that the tracker calls `{name}` `{tracker}`, and no recording has the name `{tracker}`; `{name}` is what the recordings call so.",
+            "Correct the name under `names`, or remove it if the recordings have the profile's names.";
+    }
 }

@@ -5,6 +5,7 @@ use std::io::{self, BufWriter, Write as _};
 use std::path::{Path, PathBuf};
 
 use calib_files::{FileError, GrowingFile, OutputFile, ResultsFolder};
+use calib_finding::cell as safe;
 
 use super::error::BatchError;
 use super::page::Page;
@@ -164,7 +165,7 @@ fn line(cells: impl Iterator<Item = String>) -> String {
 fn shown(cell: &Cell) -> String {
     match cell {
         Cell::Empty => String::new(),
-        Cell::Text(text) => text.clone(),
+        Cell::Text(text) => safe(text).into_owned(),
         Cell::Integer(value) => value.to_string(),
         // The shortest that reads back as the same number.
         Cell::Real(value) => format!("{value:e}"),

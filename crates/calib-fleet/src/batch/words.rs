@@ -1,5 +1,6 @@
 //! What a terminal shows of a fleet.
 
+use calib_finding::printable_line;
 use std::fmt::Write as _;
 
 use super::summary::Summary;
@@ -33,7 +34,8 @@ pub fn text(summary: &Summary) -> String {
     );
     for alarm in drift.alarms.iter().filter(|a| a.familywise).take(NAMED) {
         let joint = alarm.joint.as_deref().unwrap_or("no single joint");
-        let _ = writeln!(out, "  {} ({}): {joint}", alarm.name, alarm.series);
+        let alarm = format!("{} ({}): {joint}", alarm.name, alarm.series);
+        let _ = writeln!(out, "  {}", printable_line(&alarm));
     }
     if familywise > NAMED {
         let _ = writeln!(out, "  and {} more, in fleet.csv", familywise - NAMED);
@@ -42,8 +44,8 @@ pub fn text(summary: &Summary) -> String {
         let _ = writeln!(
             out,
             "series {}: joint {} changed in {} of {} robots, of which chance alone explains about {:.0}",
-            effect.series,
-            effect.joint,
+            printable_line(&effect.series),
+            printable_line(&effect.joint),
             effect.changed,
             effect.robots,
             drift.by_chance(effect),

@@ -146,5 +146,6 @@ pub fn to_check(edited: Option<&Edited>) -> &'static str {
 /// What to do next where recordings of the profile have no file.
 #[must_use]
 pub fn next_of_absent(file: &str) -> String {
+    let file = calib_finding::shell_path(file);
     format!("Next: record what is missing, or delete its entries, then calib check {file}")
 }

@@ -1,5 +1,6 @@
 //! Everything that was found, as the report's data. Renderers compute nothing; this does.
 
+use calib_finding::shell_path;
 use calib_profile::Method;
 use calib_report::{
     AccuracyLimit, DataInformation, DhTable, HeldOut, Identification, Input, MissingPhysics,
@@ -114,7 +115,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         reproduce: vec![reproduce(e)],
         undo: vec![format!(
             "calib revert {} --out original.urdf",
-            profile.outputs.urdf
+            shell_path(&profile.outputs.urdf)
         )],
         seed: 0,
         data_information: information,
@@ -211,7 +212,8 @@ fn reproduce(e: &Evidence<'_>) -> String {
         Method::Paper => Some("--method paper"),
         Method::Ml => Some("--method ml"),
     };
-    let words = ["calib run", &e.inputs.robot.file].into_iter();
+    let file = shell_path(&e.inputs.robot.file);
+    let words = ["calib run", &file].into_iter();
     let words = words.chain(method).chain(e.arguments.iter().copied());
     words.collect::<Vec<_>>().join(" ")
 }

@@ -67,7 +67,7 @@ pub fn load_recordings_with(
                     .map_err(|e| PipelineError::data(&shown, DataProblem::RowsDiffer(e)))?,
             };
         }
-        recording.rename(&robot.profile.names);
+        recording.rename(&robot.profile.names)?;
         let loaded = match &spec.timing {
             None => {
                 let poses = recording

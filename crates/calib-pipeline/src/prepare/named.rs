@@ -63,7 +63,7 @@ pub(crate) fn check(robot: &RobotProfile, tables: &Tables) -> Result<(), Pipelin
     Ok(())
 }
 
-/// Estimators that the profile names and no origin calls, and plugins of which nothing is used.
+/// What the profile names and nothing uses: estimators that no origin calls, plugins, and names of the tracker that no recording has.
 pub(crate) fn unused(inputs: &Inputs) -> Vec<Finding> {
     let profile = &inputs.robot.profile;
     let mut findings = Vec::new();
@@ -102,6 +102,19 @@ pub(crate) fn unused(inputs: &Inputs) -> Vec<Finding> {
             .with("plugin", Fact::name(key))
             .with("offers", Fact::names(offers)),
         );
+    }
+    for (name, from) in profile.names.iter().filter(|(name, from)| name != from) {
+        let mut recordings = inputs.recordings.values();
+        if !recordings.any(|recording| recording.meta.renamed(name, from)) {
+            findings.push(
+                Finding::new(
+                    catalog::TRACKER_NAME_UNUSED,
+                    Subject::default().in_file(&inputs.robot.file),
+                )
+                .with("name", Fact::name(name))
+                .with("tracker", Fact::name(from)),
+            );
+        }
     }
     findings
 }

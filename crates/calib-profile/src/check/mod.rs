@@ -43,10 +43,15 @@ pub fn check(
             vec![Problem::new(place, finding, "name the URDF of a robot")],
         ));
     }
+    let places = Places::of(text);
+    let hidden: Vec<Problem> = places.hidden().into_iter().map(hides).collect();
+    if !hidden.is_empty() {
+        return Err(ProfileError::new(file, text, hidden));
+    }
     let mut checker = Checker {
         raw,
         robot,
-        places: Places::of(text),
+        places,
         problems: Vec::new(),
         unknown: BTreeMap::new(),
     };
@@ -57,6 +62,21 @@ pub fn check(
     } else {
         Err(ProfileError::new(file, text, checker.problems))
     }
+}
+
+/// A text that shows something else than it is, on a terminal, in a report or in a table.
+fn hides((place, c): (Place, char)) -> Problem {
+    let what = match c {
+        '\n' | '\r' => "a line break".to_owned(),
+        '\t' => "a tab".to_owned(),
+        c => format!("the character U+{:04X}, which is not shown", u32::from(c)),
+    };
+    let finding = format!("this text has {what}");
+    Problem::new(
+        Some(place),
+        finding,
+        "write names without control characters",
+    )
 }
 
 mod body;

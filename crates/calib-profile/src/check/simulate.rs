@@ -215,6 +215,28 @@ impl Checker<'_> {
         }
     }
 
+    /// A recording that fits into the memory of a computer.
+    fn not_too_many(&mut self, name: &str, raw: &RawProtocol) {
+        /// Their table has some hundred megabytes.
+        const MOST: usize = 1_000_000;
+        let repeated = raw.repeat_at.values().next().map_or(1, Vec::len);
+        let grid = raw.grid.iter().map(|steps| steps.poses);
+        let grid = grid.fold(repeated, usize::saturating_mul);
+        let random = raw.poses.saturating_mul(repeated);
+        for (key, is_given, count) in [
+            ("grid", !raw.grid.is_empty(), grid),
+            ("poses", !raw.random.is_empty(), random),
+        ] {
+            if is_given && count > MOST {
+                self.key_problem(
+                    &["simulate", "recordings", name, key],
+                    format!("{count} poses are asked for"),
+                    format!("simulate {MOST} or fewer in a recording"),
+                );
+            }
+        }
+    }
+
     pub(super) fn protocol(&mut self, name: &str, raw: &RawProtocol) -> Protocol {
         let at = |key: &'static str| ["simulate", "recordings", name, key];
         let grid = self.grid(name, &raw.grid);
@@ -233,6 +255,7 @@ impl Checker<'_> {
                 "give `grid` or `random`, not both",
             );
         }
+        self.not_too_many(name, raw);
         let mut repeat_at = None;
         for (key, values) in &raw.repeat_at {
             if let Some((joint, factor)) =

@@ -4,6 +4,7 @@ use super::header::{JOINT, Layout, reads_as_joint};
 use crate::column_map::ColumnMap;
 use crate::model::{self, JointUnit, MarkerSample, Recording, Timeline, WHOLE_ROBOT};
 use crate::poses::{NotOneTable, Poses};
+use calib_finding::printable_line;
 use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -149,7 +150,7 @@ fn write(poses: &Poses, filled: &Filled, options: &WriteOptions) -> Result<Strin
     }
     let mut out = String::new();
     for comment in &options.comments {
-        let one_line = comment.replace(['\n', '\r'], " ");
+        let one_line = printable_line(comment);
         let _ = writeln!(out, "# {one_line}");
     }
     let (header, count) = header(poses, filled, options, &columns);

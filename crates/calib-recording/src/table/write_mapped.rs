@@ -3,6 +3,7 @@
 //! The layout is the one that reading has: every slot of it says from which column and by which factor a number comes, so that what is
 //! written is `value · factor`. What is written is read again, and refused where something else comes back.
 
+use calib_finding::printable_line;
 use std::collections::BTreeMap;
 use std::fmt::Write;
 
@@ -141,7 +142,7 @@ fn header(poses: &Poses, map: &ColumnMap, options: &WriteOptions) -> Vec<String>
 fn above(out: &mut String, map: &ColumnMap, options: &WriteOptions) {
     let comment = |k: usize| {
         let text = options.comments.get(k).map_or("", String::as_str);
-        format!("# {}", text.replace(['\n', '\r'], " "))
+        format!("# {}", printable_line(text))
     };
     let hash = map.time.iter().any(|time| time.column.starts_with('#'));
     let hash = hash || map.joint_columns.iter().any(|name| name.starts_with('#'));

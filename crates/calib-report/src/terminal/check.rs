@@ -3,14 +3,14 @@
 use super::look::{Look, painted};
 use crate::table::{Table, wrap};
 use crate::words::check::{bar, noise, recording, without_noise};
-use crate::{CheckOutcome, DataChecks, Severity, number};
+use crate::{CheckOutcome, DataChecks, Severity, number, printable_line};
 use anstyle::{AnsiColor, Style};
 
 /// What was recorded, what passed, what was not checked, and what was found.
 #[must_use]
 pub fn data_checks(of: &DataChecks, look: Look) -> String {
     let columns = look.columns;
-    let mut text = painted(look, Style::new().bold(), &of.robot) + "\n";
+    let mut text = painted(look, Style::new().bold(), &printable_line(&of.robot)) + "\n";
     for r in &of.recordings {
         text += &wrap(&recording(r), columns, "  ", "    ");
         if !r.alignment.is_empty() {

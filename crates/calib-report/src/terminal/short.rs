@@ -6,7 +6,7 @@ use crate::words::headline::{Headline, headline, steps};
 use crate::words::prose::sentence;
 use crate::words::remarks::{Remark, remarks};
 use crate::words::{self, diagnosis};
-use crate::{Effect, Report, Unit, number};
+use crate::{Effect, Report, Unit, number, printable_line};
 use anstyle::AnsiColor;
 
 /// Rows of a summary: a terminal has 24, and the command and the next prompt stand in it, too.
@@ -30,7 +30,8 @@ pub(super) fn line(report: &Report, look: Look, places: Places<'_>) -> String {
     };
     let word = painted(look, verdict_style(report.verdict), &report.verdict_line());
     let at = places.page;
-    format!("{word}: {}, {}{limit}: {at}\n", report.robot, number.value)
+    let robot = printable_line(&report.robot);
+    format!("{word}: {robot}, {}{limit}: {at}\n", number.value)
 }
 
 /// Lines of text within the width.
@@ -52,7 +53,7 @@ fn head(report: &Report, look: Look) -> Vec<String> {
         report.method.name(),
         report.version
     );
-    let mut out = vec![clip(&title, look.columns)];
+    let mut out = vec![clip(&printable_line(&title), look.columns)];
     let number = headline(report);
     out.extend(lines(&first_line(&number), look, "", "  "));
     let all: Vec<String> = steps(report)

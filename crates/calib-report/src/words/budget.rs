@@ -3,6 +3,7 @@
 use super::prose::code;
 use crate::budget::{Budget, COVERAGE_FACTOR, Evaluation};
 use crate::{ErrorSource, Report, Unit, number};
+use calib_finding::printable_line;
 use statrs::distribution::{ContinuousCDF, StudentsT};
 
 /// Below this many degrees of freedom k = 2 covers less than 94.5 % of a normal error: the factor for 95 % is stated.
@@ -56,7 +57,7 @@ pub(crate) fn certificate(report: &Report, budget: &Budget) -> String {
     let [u, expanded] = [budget.combined_m, budget.expanded_m()].map(length);
     format!(
         "{}: position error on a new pose, u = {u}, U = {expanded} (k = 2), effective degrees of freedom {freedom}{robot}",
-        report.robot
+        printable_line(&report.robot)
     )
 }
 

@@ -1,6 +1,7 @@
 //! Why a result was not accepted, and the command that comes next.
 
 use super::prose::{code, full_stop};
+use crate::shell_path;
 use crate::{Diagnosis, Output, ReasonId, Report, Unit, Verdict, number};
 
 /// Multiples of the tracker's noise that a limit of the rms error should leave room for.
@@ -183,7 +184,7 @@ fn of_reason(report: &Report, id: &str, again: &str) -> Option<[String; 2]> {
 
 /// The command that runs a profile again.
 pub(crate) fn again(profile: &str) -> String {
-    format!("calib run {profile}")
+    format!("calib run {}", shell_path(profile))
 }
 
 /// Diagnosis and remedy of a result that was not accepted; `again` is the command that runs the profile.
@@ -211,5 +212,6 @@ pub(crate) fn apply(report: &Report, results: &str, urdf: &str) -> Option<String
     );
     let no_better = ReasonId::NotBetterThanRegistration;
     let gains = !report.changes.is_empty() && !report.reason_ids.contains(&no_better);
+    let [results, urdf] = [results, urdf].map(shell_path);
     (accepted && gains).then(|| format!("calib apply {results} {urdf} --diff"))
 }

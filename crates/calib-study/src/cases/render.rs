@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
+use calib_finding::cell as safe;
 use calib_report::{LoopClosure, Stats};
 
 use super::{CaseResult, METHODS, Off, Over, RobotResult};
@@ -43,10 +44,11 @@ pub fn csv(result: &CaseResult) -> String {
             let mut row = |group: &str, samples, t: &Stats, turn: Option<&Stats>, norm| {
                 let _ = writeln!(
                     out,
-                    "{},{},{},{group},{samples},{},{},{}",
+                    "{},{},{},{},{samples},{},{},{}",
                     r.seed,
                     r.method,
-                    l.name,
+                    safe(&l.name),
+                    safe(group),
                     three(Some(t), 1e3),
                     three(turn, 1f64.to_degrees()),
                     three(norm, 1e3),

@@ -130,6 +130,9 @@ pub enum RecordError {
     /// `--map` is not a pair of names.
     #[error("--map `{0}`\n  help: write the profile's name and the tracker's: --map gripM=body_0")]
     Map(String),
+    /// A name stands in two pairs of `--map`, on the same side.
+    #[error("--map: `{0}` is mapped twice\n  help: map each name to one other name")]
+    MapTwice(String),
     /// The tracker's names do not fit the profile's; the text says how.
     #[error("{0}")]
     Names(String),

@@ -18,6 +18,7 @@ use calib_capture::{
 use calib_pipeline::ExitCode;
 use calib_pipeline::prepare::load::{RobotProfile, load_robot};
 use calib_profile::RecordingSpec;
+use calib_recording::renamed_comment;
 use clap::Args;
 
 use super::plugin_options::PluginOptions;
@@ -337,10 +338,7 @@ fn comments(
         }
     });
     for watched in plan.watched.iter().filter(|w| w.name != w.from) {
-        comments.push(format!(
-            "{} is the tracker's {}",
-            watched.name, watched.from
-        ));
+        comments.push(renamed_comment(&watched.name, &watched.from));
     }
     comments
 }
