@@ -97,9 +97,8 @@ impl Page<'_> {
     /// A name that no link and no body has.
     fn tracker_frame(&self) -> String {
         let bodies = || self.proposal.bodies.iter().map(|body| &body.name);
-        let taken = |name: &String| {
-            self.model.link_id(name).is_ok() || bodies().any(|body| body == name)
-        };
+        let taken =
+            |name: &String| self.model.link_id(name).is_ok() || bodies().any(|body| body == name);
         let mut name = "tracker".to_owned();
         while taken(&name) {
             name.push_str("_frame");
