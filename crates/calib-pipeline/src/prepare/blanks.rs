@@ -131,7 +131,7 @@ mod tests {
         values[700..760].fill(None);
         let found = of_streams("r", &stream(times, values));
         assert_eq!(found.len(), 1);
-        assert!(found[0].text().contains("2.12 s"), "{}", found[0].text());
-        assert!(found[0].text().contains("1.51 s"), "{}", found[0].text());
+        assert!(found[0].text().contains("2120 ms"), "{}", found[0].text());
+        assert!(found[0].text().contains("1510 ms"), "{}", found[0].text());
     }
 }
