@@ -1,7 +1,7 @@
 //! Did the tracker, a body or the zero of a joint change between the fitted recordings and a held-out one?
 //!
 //! Held-out errors of a robot that is right are small; of one that is wrong they differ from posture to posture. Errors that one motion
-//! explains are neither: something moved. It is named where r(none) / r(best) ≥ 3, with r as in [`crate::verify::tried`].
+//! explains are neither: something moved. It is named where r(none) / r(best) ≥ 3, with r as in `tried.rs`.
 //!
 //! One number of a joint can also be what the fit does not know: a zero counts as changed where the errors are beyond what the fit states of
 //! their prediction, once in a thousand validations.
