@@ -390,6 +390,21 @@ fn from_a_urdf_alone_to_a_plan_and_a_run() {
     assert!(ran.code < 2, "{}{}", ran.stdout, ran.stderr);
 }
 
+/// The profile calls no frame as a link is called: reading it would refuse that.
+#[test]
+fn the_frame_of_the_tracker_has_a_name_of_its_own() {
+    let urdf = std::fs::read_to_string(root().join("robots/ripley/r17.urdf")).expect("committed");
+    let urdf = urdf.replace("\"gripper\"", "\"tracker\"");
+    let dir = Scratch::new().file("r17.urdf", urdf);
+    let made = dir.calib(["init", "r17.urdf", "--markers-on", "tracker"]);
+    assert_eq!(made.code, 0, "{}", made.stderr);
+    let written = dir.read("robots/ripley.yaml");
+    assert!(written.contains("frame: tracker_frame"), "{written}");
+    let profile = "robots/ripley.yaml";
+    let simulated = dir.calib(["simulate", profile, "--out", "robots/ripley"]);
+    assert_eq!(simulated.code, 0, "{}", simulated.stderr);
+}
+
 /// An arm beside which another one is bent at 0, and that slides where 0 is out of reach.
 #[test]
 fn postures_that_nothing_asks_for_are_within_all_limits() {

@@ -421,6 +421,9 @@ fn several_joints_without_a_column_in_one_recording() {
         wrong[0]["about"]["recordings"],
         serde_json::json!(["wrist_pitch"])
     );
+    // Nothing more is said of the same columns.
+    let of_columns = found.iter().filter(|f| f["id"] == "joint-column-missing");
+    assert_eq!(of_columns.count(), 1, "{found:#?}");
     let said = wrong[0]["text"].as_str().expect("a sentence");
     for joint in joints {
         assert!(said.contains(joint), "{said}");

@@ -35,6 +35,7 @@ mod many_markers;
 mod month;
 mod occluded;
 mod outputs;
+mod pan_tilt;
 mod plan;
 mod plugin_effects;
 mod plugin_names;

@@ -401,7 +401,7 @@ fn found(mistake: &Mistake) -> String {
         } => {
             let unit = if *turns { Unit::Radian } else { Unit::Meter };
             format!(
-                "Joint `{joint}` stood at {}, which no column says.",
+                "Joint `{joint}` stood at {}; no column says so.",
                 number::plain(*value, unit)
             )
         }

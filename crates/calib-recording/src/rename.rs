@@ -25,12 +25,6 @@ impl Meta {
         let comments = self.comments.iter().cloned();
         comments.filter(move |said| said.contains(&middle))
     }
-
-    /// Whether the file says that this name is not the tracker's any more.
-    fn says_renamed(&self, name: &str) -> bool {
-        let start = renamed_comment(name, "");
-        self.comments.iter().any(|said| said.starts_with(&start))
-    }
 }
 
 fn note(name: &str, from: &str) -> String {
@@ -39,7 +33,7 @@ fn note(name: &str, from: &str) -> String {
 
 impl Recording {
     /// Calls bodies and markers by other names, all at once, so that two of them can be exchanged: new name → name in the recording. A
-    /// name that the recording does not have stays as it is, and so does one of which the file says that it was renamed already; what was renamed
+    /// name that the recording does not have stays as it is, and so does one where the file says that it was renamed so before; what was renamed
     /// is among the conversions.
     ///
     /// # Errors
@@ -48,7 +42,8 @@ impl Recording {
         let there = self.tracked();
         let asked = names.iter();
         let asked = asked.filter(|(new, old)| new != old && there.contains(*old));
-        let asked = asked.filter(|(_, old)| !self.meta.says_renamed(old));
+        let said = |new: &str, old: &str| self.meta.comments.contains(&renamed_comment(new, old));
+        let asked = asked.filter(|(new, old)| !said(new, old));
         let new: BTreeMap<String, String> =
             asked.map(|(new, old)| (old.clone(), new.clone())).collect();
         let taken = |name: &String| there.contains(name) && !new.contains_key(name);
@@ -86,11 +81,11 @@ impl Recording {
                 known: there.iter().cloned().collect(),
             }));
         }
-        for from in names.values() {
-            let start = renamed_comment(from, "");
-            let comments = &mut self.meta.comments;
-            comments.retain(|said| !said.starts_with(&start));
-        }
+        let asked = |said: &String| {
+            let mut pairs = names.iter();
+            pairs.any(|(name, from)| *said == renamed_comment(name, from))
+        };
+        self.meta.comments.retain(|said| !asked(said));
         self.rename(names)
     }
 
@@ -152,6 +147,10 @@ mod tests {
         assert!(again.meta.renamed("M", "N"));
         again.rename_all(&exchange).expect("asked for");
         assert_eq!(names(&again), ["N", "M"]);
+        // Another name than the one that the file has it from.
+        let mut once = read(&[renamed_comment("M", "Q")]);
+        once.rename(&map(&[("A", "M")])).expect("not renamed so");
+        assert_eq!(names(&once), ["A", "N"]);
     }
 
     #[test]

@@ -12,7 +12,7 @@ const UNIT: f64 = 1e-6;
 const FLIP: f64 = 1.75;
 /// … it is this many times the usual turn between rows.
 const FLIP_RATIO: f64 = 4.0;
-/// … and the body's origin stays within a marker pattern, m, beyond what the joints carry it. a rotation of 100° about an axis that is
+/// … and the body's origin stays within a marker pattern, m, beyond what the joints carry it. A rotation of 100° about an axis that is
 /// 65 mm or more away from the body carries it farther.
 const PATTERN: f64 = 0.1;
 /// Where no joint is recorded: a body moves by up to this many times its usual step between rows.

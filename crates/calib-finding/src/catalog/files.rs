@@ -58,7 +58,7 @@ super::topic! {
     /// A name of the tracker that the profile states, and that no recording has.
     TRACKER_NAME_UNUSED = "tracker-name-unused" {
         "": Info,
-            "The profile says that the tracker calls `{name}` `{tracker}`, and no recording has the name `{tracker}`; `{name}` is what the recordings call so.",
+            "The profile says that the tracker calls `{name}` `{tracker}`, and no recording has the name `{tracker}`. Where a recording has the name `{name}`, that is used.",
             "Correct the name under `names`, or remove it if the recordings have the profile's names.";
     }
 }

@@ -106,10 +106,10 @@ super::topic! {
     /// Rows without a reading of a joint.
     JOINT_VALUES_MISSING = "joint-values-missing" {
         "rows": Warning,
-            "{count} of {rows:row} have no value of {joints:code}: they take no part.",
+            "In {count} of {rows:row} there is no value of {joints:code}: left out.",
             "Export the joint's value in every row. Where it stood still, remove its column and say where: `hold` in the recording.";
         "gaps": Warning,
-            "Between their first and their last reading {joints:code} have none for {all}, at most {longest} at once: what the tracker saw then takes no part.",
+            "Between the first and the last reading of {joints:code} there are gaps of {all} in all, the longest {longest}: what the tracker saw then is left out.",
             "Look for the readings that the robot's log lost, or record again.";
     }
     /// Two joints are equal in every row.

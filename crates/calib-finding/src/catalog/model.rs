@@ -13,14 +13,14 @@ super::topic! {
             "The recordings fit the nominal robot to {none} rms, but to {best} with joints `{joint}` and `{other}` exchanged[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Exchange the names of these columns in the header, or map them: `columns: {joints: {{joint}: <column of {other}>, {other}: <column of {joint}>}}`.";
     }
-    /// The zero of a joint is off by a multiple of 90°.
+    /// The zero of a joint is off by a multiple of 90°, or a joint that never moved stood elsewhere than it was read.
     JOINT_OFFSET = "joint-offset" {
         "turned": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} with {offset} added to joint `{joint}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Correct the zero of this joint: add {offset} to its column, or rotate the joint's origin in the URDF by {offset} about its axis.";
         "stood": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} if joint `{joint}`, whose readings never change, stood at {at} {unit}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
-            "Say where this joint stood as the controller showed it, about {at} {unit}: in its column, or without a column by `hold: {{joint}_{unit}: {at}}` in the recording.";
+            "State the position that the controller showed for this joint, about {at} {unit}: in its column, or in `hold: {{joint}_{unit}: {at}}` of a recording without this column.";
     }
     /// A joint also moves with another joint.
     JOINT_COUPLING = "joint-coupling" {
@@ -50,10 +50,10 @@ super::topic! {
             "Record this joint: export its column. If it stood still, state where: `hold: {{joint}_{unit}: 0}` in the recording.";
         "stood": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} if joint `{joint}`, which has no column, stood at {at} {unit}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
-            "Record this joint, or state where the controller showed it, about {at} {unit}: `hold: {{joint}_{unit}: {at}}` in the recording.";
+            "Record this joint, or state the position that the controller showed for it, about {at} {unit}: `hold: {{joint}_{unit}: {at}}` in the recording.";
         "apart": Error,
-            "The recordings fit the nominal robot to {none} rms, where nominal errors explain {limit}. Without {recordings:code} the others fit to {rest}. Joints without a column there were taken to stand at 0: {joints:code}.",
-            "Record these joints, or state for each where it stood: `hold: {{joint}_{unit}: 0}` in the recording, with the true value.";
+            "The recordings fit the nominal robot to {none} rms, where nominal errors explain {limit}. Without {recordings:code}, where joints without a column were taken to stand at 0 ({joints:code}), the others fit to {rest}.",
+            "Record these joints, or state the position that the controller showed for each: `hold: {{joint}_{unit}: 0}` in the recording, with its value in place of 0.";
     }
     /// A body is on another link.
     WRONG_MOUNT = "wrong-mount" {
@@ -88,7 +88,7 @@ super::topic! {
     /// A joint's zero is another one in held-out recordings.
     JOINT_ZERO_CHANGED = "joint-zero-changed" {
         "": Error,
-            "The errors in {recordings:code} are {none} per coordinate, but only {best} if joint `{joint}` stands {step} ± {sigma} beyond its values there, as after a change of its zero.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
+            "The errors in {recordings:code} are {none} per coordinate, but only {best} if the zero of joint `{joint}` changed by {step} ± {sigma} before.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
             "Check the encoder of joint `{joint}`, its coupling, how it is homed and, where a recording states its value, this value. If its zero changed, record the fitted recordings again as well: they are of the robot as it was.";
     }
     /// Tracker and joints were read at different times.

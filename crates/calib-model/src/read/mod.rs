@@ -127,12 +127,12 @@ impl Model {
         model.add_fixed(file, &names)?;
         model.add_movers();
         model.add_uncertainty(file, &names)?;
-        model.tell_apart();
+        model.rename_like_links();
         Ok(model)
     }
 
     /// A body or point with the name of a link gets another one, as in the scene: a pose under that name is the link's.
-    fn tell_apart(&mut self) {
+    fn rename_like_links(&mut self) {
         let fixed = self.bodies.iter().chain(&self.points);
         let mut taken: BTreeSet<String> = fixed.map(|f| f.name.clone()).collect();
         taken.extend(self.links.iter().cloned());

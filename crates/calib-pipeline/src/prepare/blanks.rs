@@ -14,7 +14,7 @@ const MOST: f64 = 0.5;
 /// Readings that are farther apart than this many times the usual distance have a gap between them.
 const GAP: f64 = 5.0;
 
-/// The shortest gap that is told, s: no hold is missed in less.
+/// The shortest gap that is told, s: a hold is seldom shorter.
 const LEAST_GAP: f64 = 0.5;
 
 /// A joint whose column holds nothing at all.

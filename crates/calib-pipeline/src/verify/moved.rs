@@ -26,7 +26,7 @@ use crate::verify::tried::{Motion, Tried, remounted, rows, tracker, zero_changed
 const NAMED: f64 = 3.0;
 /// What comes within this factor of the best is named beside it.
 const ALIKE: f64 = 1.5;
-/// A motion beside which more of the points than the rest are gross outliers explains nothing.
+/// A motion that leaves fewer than this part of the points explains nothing: the others would be gross outliers beside it.
 const KEPT: f64 = 0.75;
 /// Fewer postures than this are explained by any motion.
 const POSTURES: usize = 5;

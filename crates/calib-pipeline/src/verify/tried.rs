@@ -18,9 +18,9 @@ use crate::verify::seen::{Seen, View};
 const GROSS: f64 = 5.0;
 /// Step of a joint in difference quotients, rad or m.
 const STEP: f64 = 1e-5;
-/// Linearizations of a joint's step, where the first is worth it.
+/// Linearizations of a joint's step.
 const ROUNDS: usize = 3;
-/// Part of the errors that is left at most where it is.
+/// Part of the errors that the first linearization leaves, at most, where a second one is worth its time.
 const WORTH: f64 = 0.7;
 
 /// What may have moved.

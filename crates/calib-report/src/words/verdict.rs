@@ -325,7 +325,9 @@ fn of_prediction(reason: &Reason, v: &Values<'_>) -> String {
             let [value, high] = ["value", "high"].map(|key| v.number(key));
             let because = match v.name("cause") {
                 "" => "the stated uncertainty is too small".to_owned(),
-                cause => format!("by what `{cause}` names, or the stated uncertainty is too small"),
+                cause => format!(
+                    "because of what `{cause}` names, or because the stated uncertainty is too small"
+                ),
             };
             format!("χ²/dof of the held-out errors is {value}, above {high}: {because}.")
         }

@@ -14,8 +14,8 @@ use calib_finding::{Fact, Finding, catalog};
 
 /// Distances stay within this many σ: one in 10⁶ does not.
 const SIGMAS: f64 = 5.0;
-/// σ of a mean distance that no number of rows lessens, m: a tracker sees a marker's center off by some 0.1 mm, by its calibration and
-/// by the side that the marker shows. With [`SIGMAS`], less than 0.5 mm is never a fault.
+/// σ of a mean distance of however many rows, m: the center that a tracker sees of a marker is off by some 0.1 mm, which depends on its
+/// calibration and on the side that the marker shows. With [`SIGMAS`], less than 0.5 mm is never a fault.
 const CENTERS: f64 = 1e-4;
 /// σ of a median over that of a mean.
 const MEDIAN: f64 = 1.2533;

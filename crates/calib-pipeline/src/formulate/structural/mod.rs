@@ -78,7 +78,9 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
         return found;
     };
     found.findings.extend(decision(&layout, &outcome));
-    found.findings.extend(limits::findings(&layout, &outcome));
+    let mut beside = limits::findings(&layout, &outcome);
+    beside.retain(|finding| !without::says(&found.findings, finding));
+    found.findings.extend(beside);
     found.rows_count = matches!(
         outcome.decision,
         Decision::Consistent { .. } | Decision::TooFewData { .. }

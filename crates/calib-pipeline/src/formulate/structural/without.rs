@@ -71,6 +71,18 @@ pub(super) fn in_place_of(
     apart(layout, outcome)?.of_columns(layout, outcome)
 }
 
+/// Whether a finding about all joints without a column in some recordings says what another finds of one of them.
+pub(super) fn says(findings: &[Finding], other: &Finding) -> bool {
+    let of_all = |finding: &&Finding| {
+        let kind = finding.facts.get("kind").and_then(Fact::word);
+        finding.id == catalog::JOINT_COLUMN_MISSING && kind == Some("apart")
+    };
+    let mut of_all = findings.iter().filter(of_all);
+    let recordings = &other.subject.recordings;
+    other.id == catalog::JOINT_COLUMN_MISSING
+        && of_all.any(|finding| recordings.iter().all(|r| finding.subject.is_in(r)))
+}
+
 impl Apart {
     fn names(&self, layout: &Layout<'_>) -> Vec<String> {
         let recordings = self.recordings.iter();
