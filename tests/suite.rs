@@ -21,6 +21,7 @@ mod fit;
 mod fleet;
 mod fleet_faults;
 mod gantry;
+mod held_readings;
 mod holds_and_rows;
 mod hostile;
 mod hygiene;

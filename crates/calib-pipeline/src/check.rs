@@ -16,7 +16,7 @@ use crate::formulate::bad_rows::{bad_rows, is_judged};
 use crate::formulate::by_likelihood::only_a_cross_check;
 use crate::formulate::completed::beside;
 use crate::formulate::formulation::{FreeSet, MlFit};
-use crate::formulate::{ml, model_checks};
+use crate::formulate::{held, ml, model_checks};
 use crate::options::Plugins;
 use crate::output::of_data::{coverage, lost, used_for};
 use crate::prepare::aligned::Alignment;
@@ -41,6 +41,7 @@ pub fn check(profile: &Path, plugins: Plugins) -> Result<DataChecks, PipelineErr
     let mut findings = inputs.findings.clone();
     if inputs.robot.profile.solve.robust {
         findings.extend(relabel(&mut inputs));
+        findings.extend(held::take_out(&mut inputs));
     }
     let of_data = checks::check(&inputs);
     // A column written twice does not keep the others from being compared with the robot, row by row.

@@ -176,6 +176,7 @@ impl DataCheck {
                 catalog::ROW_OUTLIER,
                 catalog::ROW_CUT_OFF,
                 catalog::JOINT_VALUES_MISSING,
+                catalog::JOINT_READINGS_HELD,
             ],
             Self::Validation => &[catalog::HELD_OUT_IN_TRAINING],
             Self::Structure => &[

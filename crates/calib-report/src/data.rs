@@ -104,7 +104,7 @@ pub struct Rejected {
     pub recording: String,
     /// The body or marker; empty when the whole row was rejected.
     pub subject: String,
-    /// Rows, counted from 1 without the header.
+    /// Rows, as the recording numbers them: lines from 1 of our own tables, frames of a tracker's file.
     pub rows: Vec<u64>,
     /// How many measurements these are: an excluded body counts once per marker that was seen.
     #[serde(default)]
@@ -127,6 +127,8 @@ pub enum RejectedFor {
     OnTheWay,
     /// Its hold drifts or scatters.
     RestlessHold,
+    /// Its joint readings are those of an earlier row, and the body had moved meanwhile.
+    HeldReadings,
     /// The whole body is off, markers together.
     NotSettled,
     /// A pose needed to predict it was lost.

@@ -74,9 +74,9 @@ impl Diagnosis {
         ) {
             return None;
         }
-        let found = below_noise(report)
-            .or_else(|| clock_offset(report))
+        let found = clock_offset(report)
             .or_else(|| error(report))
+            .or_else(|| below_noise(report))
             .or_else(|| changed(report))
             .or_else(|| missing_effect(report))
             .or_else(|| named(report))
@@ -104,11 +104,17 @@ fn below_noise(report: &Report) -> Option<Diagnosis> {
 }
 
 /// Stated noise of the tracker over the noise that was found, at most 1: what a model lacks is found as noise, too. Where that is known, no more
-/// than the stated noise is called the tracker's anyway.
+/// than the stated noise is called the tracker's anyway. Where none is stated, and the noise is far above the scatter of the markers about their bodies, it
+/// is not the tracker's.
 fn stated_share(report: &Report) -> f64 {
     let lacking = [catalog::MISSING_PHYSICS, catalog::CHANGED_WHILE_RECORDING];
     if report.findings.iter().any(|f| lacking.contains(&f.id)) {
         return 1.0;
+    }
+    let mut reasons = report.reason_facts.iter();
+    let above = reasons.find(|reason| reason.id == ReasonId::NoiseAboveScatter);
+    if let Some(factor) = above.and_then(|reason| reason.values.get("factor")?.value()) {
+        return 1.0 / factor;
     }
     let noise = report.noise.iter();
     let positions = noise.filter(|noise| noise.kind == NoiseKind::Position);

@@ -10,7 +10,7 @@ use std::sync::Arc;
 pub struct ResidualRow {
     /// The recording's name, once for all its rows.
     pub recording: Arc<str>,
-    /// Row in the recording, counted from 1 without the header.
+    /// Row, as the recording numbers it: line from 1 of our own tables, frame of a tracker's file.
     pub row: u64,
     /// Time in the recording, s; `None` for static poses.
     pub time_s: Option<f64>,

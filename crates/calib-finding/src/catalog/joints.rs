@@ -102,6 +102,9 @@ super::topic! {
         "empty": Error,
             "The joint has no values.",
             "Check that the column is the measured position of this joint, and that the joint was swept.";
+        "although": Error,
+            "All readings of the joint are {at}, but in {count} of {of:row} body `{body}` is where it would be if the joint had moved, over {moved} in all.",
+            "Look for why the readings of this joint do not change: another column was exported, or its encoder is not read. Record again.";
     }
     /// Rows without a reading of a joint.
     JOINT_VALUES_MISSING = "joint-values-missing" {
@@ -111,6 +114,12 @@ super::topic! {
         "gaps": Warning,
             "Between the first and the last reading of {joints:code} there are gaps of {all} in all, the longest {longest}: what the tracker saw then is left out.",
             "Look for the readings that the robot's log lost, or record again.";
+    }
+    /// Joint readings that stood still while the robot moved.
+    JOINT_READINGS_HELD = "joint-readings-held" {
+        "": Warning,
+            "In {rows} of {of:row} all joint readings repeat those of an earlier row, but the bodies moved by up to {distance} meanwhile: left out. Of rows with the same readings, the first fits the nominal robot ({first} rms with all other rows), the last does not ({last}).",
+            "Look for what stopped or slowed the log of the joints, or moved the bodies beside them. Record again if too few rows are left.";
     }
     /// Two joints are equal in every row.
     JOINT_DUPLICATE = "joint-duplicate" {

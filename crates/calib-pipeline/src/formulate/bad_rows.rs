@@ -16,7 +16,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_geometry::so3;
 use calib_profile::Usage;
-use calib_urdf::JointId;
+use calib_urdf::{JointId, JointKind, RobotModel};
 use nalgebra::{Isometry3, Vector6};
 use rayon::prelude::*;
 
@@ -39,6 +39,10 @@ const LARGEST_FRACTION: f64 = 0.5;
 const FAR_OFF: f64 = 3.0;
 /// One joint alone explains a row when it leaves no more than this of the squared error.
 const ONE_JOINT_LEFT: f64 = 0.3;
+/// Places of a joint that are not the same one, rad and m: a degree, two millimeters.
+const PLACES_APART: (f64, f64) = (0.0175, 2e-3);
+/// Places that a joint has moved to where it did not slip, or stand elsewhere, once.
+const PLACES: usize = 3;
 /// Median and σ of the length of a Gaussian 3-vector: √χ²₃(½).
 const MEDIAN_OF_THREE: f64 = 1.538;
 
@@ -109,8 +113,9 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
             }
             bad.findings
                 .extend(unsettled_finding(recording, name, loaded, &moving));
-            bad.findings
-                .extend(outlier_finding(recording, name, loaded, &others));
+            let outliers = standing_finding(inputs, loaded, name, &others)
+                .or_else(|| outlier_finding(&inputs.robot.model, name, loaded, &others));
+            bad.findings.extend(outliers);
             bad.unsettled.extend(moving.iter().map(|(row, _)| Excluded {
                 recording: recording.clone(),
                 row: *row,
@@ -178,8 +183,55 @@ fn unsettled_finding(
     )
 }
 
+/// The finding about a joint that moved although all its readings are the same: an error of it explains the rows, and is another one from row to row. A body
+/// that slipped once on its link, or a joint that stood elsewhere, is off by the same in all of them.
+fn standing_finding(
+    inputs: &Inputs,
+    loaded: &Loaded,
+    body: &str,
+    rows: &[(usize, FarOff)],
+) -> Option<Finding> {
+    let model = &inputs.robot.model;
+    let mut moved: BTreeMap<JointId, Vec<f64>> = BTreeMap::new();
+    for of in rows.iter().filter_map(|(_, off)| off.joint) {
+        moved.entry(of.joint).or_default().push(of.step);
+    }
+    let (joint, mut steps) = moved.into_iter().max_by_key(|(_, steps)| steps.len())?;
+    let mut readings = loaded.q.iter().flatten().map(|q| q[joint.index()]);
+    let at = readings.next()?;
+    if 2 * steps.len() < rows.len() || !readings.all(|reading| reading == at) {
+        return None;
+    }
+    // The other rows are off by nothing.
+    steps.push(0.0);
+    steps.sort_by(f64::total_cmp);
+    let turns = !matches!(model.joint(joint).kind, JointKind::Prismatic { .. });
+    let (apart, size): (f64, fn(f64) -> Fact) = match turns {
+        true => (PLACES_APART.0, Fact::radians),
+        false => (PLACES_APART.1, Fact::meters),
+    };
+    let places = 1 + steps.windows(2).filter(|w| w[1] - w[0] > apart).count();
+    if places < PLACES {
+        return None;
+    }
+    let name = &model.joint(joint).name;
+    Some(
+        Finding::of_kind(
+            catalog::JOINT_NEVER_MOVED,
+            "although",
+            Subject::joint(name).in_recording(&loaded.name),
+        )
+        .with("at", size(at))
+        .with("count", Fact::count(rows.len()))
+        .with("of", Fact::count(loaded.q.len()))
+        .with("body", Fact::name(body))
+        .with("moved", size(steps[steps.len() - 1] - steps[0]))
+        .at_rows(rows.iter().map(|(row, _)| loaded.poses.rows[*row])),
+    )
+}
+
 fn outlier_finding(
-    recording: &str,
+    model: &RobotModel,
     body: &str,
     loaded: &Loaded,
     rows: &[(usize, FarOff)],
@@ -187,14 +239,14 @@ fn outlier_finding(
     let (_, worst) = rows.iter().max_by(|a, b| a.1.ratio.total_cmp(&b.1.ratio))?;
     let joints: BTreeSet<&str> = rows
         .iter()
-        .filter_map(|(_, w)| w.joint.as_deref())
+        .filter_map(|(_, off)| Some(model.joint(off.joint?.joint).name.as_str()))
         .collect();
     let joints = (!joints.is_empty()).then(|| Fact::names(joints));
     Some(
         Finding::of_kind(
             catalog::ROW_OUTLIER,
             "one_body",
-            Subject::body(body).in_recording(recording),
+            Subject::body(body).in_recording(&loaded.name),
         )
         .with("count", Fact::count(rows.len()))
         .with("position", Fact::meters(worst.position))
@@ -219,7 +271,17 @@ struct FarOff {
     position: f64,
     angle: f64,
     /// The joint whose error alone would explain it.
-    joint: Option<String>,
+    joint: Option<OneJoint>,
+}
+
+/// An error of one joint.
+#[derive(Clone, Copy)]
+struct OneJoint {
+    joint: JointId,
+    /// rad or m.
+    step: f64,
+    /// Part of a row's squared error that it leaves.
+    left: f64,
 }
 
 /// Usual size of rotation, rad, and position, m, errors per component.
@@ -348,7 +410,7 @@ impl<'a> BodyError<'a> {
             .min_by(|a, b| a.1.total_cmp(&b.1))?;
         let size = self.weighted(&seen, seen.q, usual)?.norm_squared();
         let of_one = self.one_joint(&seen, usual);
-        if of_one.is_some_and(|(left, _)| size * (best.1 - left) > BETTER) {
+        if of_one.is_some_and(|of| size * (best.1 - of.left) > BETTER) {
             return None;
         }
         let e = self.at(&seen, seen.q)?;
@@ -402,18 +464,17 @@ impl<'a> BodyError<'a> {
             return None;
         }
         let joint = self.one_joint(&seen, usual);
-        let joint = joint.filter(|(left, _)| *left < ONE_JOINT_LEFT);
-        let model = &self.inputs.robot.model;
+        let joint = joint.filter(|of| of.left < ONE_JOINT_LEFT);
         Some(FarOff {
             ratio,
             position: e.fixed_rows::<3>(3).norm(),
             angle: e.fixed_rows::<3>(0).norm(),
-            joint: joint.map(|(_, joint)| model.joint(joint).name.clone()),
+            joint,
         })
     }
 
-    /// The joint whose error alone explains a row best, with the part of the squared error that it leaves.
-    fn one_joint(&self, seen: &SeenRow<'_>, usual: Usual) -> Option<(f64, JointId)> {
+    /// The joint whose error alone explains a row best.
+    fn one_joint(&self, seen: &SeenRow<'_>, usual: Usual) -> Option<OneJoint> {
         let model = &self.inputs.robot.model;
         let link = self.inputs.robot.profile.bodies[self.name].link;
         let joints = model.chain_to_root(link).into_iter();
@@ -421,10 +482,10 @@ impl<'a> BodyError<'a> {
         let left = moving.filter_map(|joint| {
             let mut only = vec![0.0; seen.q.len()];
             only[joint.index()] = 1.0;
-            let (_, left) = self.explained(seen, &only, usual)?;
-            Some((left, joint))
+            let (step, left) = self.explained(seen, &only, usual)?;
+            Some(OneJoint { joint, step, left })
         });
-        left.min_by(|a, b| a.0.total_cmp(&b.0))
+        left.min_by(|a, b| a.left.total_cmp(&b.left))
     }
 }
 

@@ -6,7 +6,7 @@ use calib_finding::Finding;
 
 use crate::error::PipelineError;
 use crate::estimate::start::{Start, start};
-use crate::formulate::model_checks;
+use crate::formulate::{held, model_checks};
 use crate::prepare::checks;
 use crate::prepare::condensed::condense;
 use crate::prepare::inputs::Inputs;
@@ -38,6 +38,7 @@ pub fn check_data(
     let mut findings = inputs.findings.clone();
     if inputs.robot.profile.solve.robust {
         findings.extend(relabel(inputs));
+        findings.extend(held::take_out(inputs));
     }
     findings.extend(checks::check(inputs));
     split(inputs);

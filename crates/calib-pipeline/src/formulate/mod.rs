@@ -14,6 +14,7 @@ pub mod formulation;
 pub mod found;
 pub(crate) mod from_origins;
 pub(crate) mod gear_ratio;
+pub(crate) mod held;
 pub mod kinematics;
 pub(crate) mod memory;
 pub mod ml;

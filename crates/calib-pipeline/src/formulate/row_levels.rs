@@ -9,6 +9,7 @@ use calib_profile::Usage;
 
 use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::row_noise::{RowNoise, middle};
+use crate::prepare::scatter;
 
 /// Recordings that share a level of noise.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,13 +35,6 @@ impl RowLevel {
         (values > 0.0).then(|| (sum / values).sqrt())
     }
 }
-
-/// A scatter counts as another one from this ratio of σ…
-const UNLIKE: f64 = 1.5;
-/// …and these standard errors of its logarithm on.
-const CERTAIN: f64 = 4.0;
-/// Variance of ln σ without outliers, times the number of values.
-const OF_LOG: f64 = 0.55;
 
 /// The levels of a problem with these samples. One where the profile states the noise as known, and where nothing speaks for more.
 pub(crate) fn row_levels(inputs: &Inputs, samples: &[(String, usize)]) -> Vec<RowLevel> {
@@ -84,10 +78,7 @@ pub(crate) fn of_means(recording: &Loaded) -> bool {
 
 /// How far ln σ of a recording is above that of another, where that is certain.
 fn unlike(recording: &Loaded, other: &Loaded) -> Option<f64> {
-    let (a, b) = (recording.scatter?, other.scatter?);
-    let above = 0.5 * (a.variance / b.variance).ln();
-    let error = (OF_LOG * (1.0 / a.values + 1.0 / b.values)).sqrt();
-    (above.abs() > UNLIKE.ln() && above.abs() > CERTAIN * error).then_some(above)
+    recording.scatter?.above(other.scatter?)
 }
 
 /// Recordings of one kind by their scatter: the first level has the one that is told by most values, and all like it.
@@ -114,7 +105,7 @@ fn by_scatter(name: &str, recordings: &[&Loaded]) -> Vec<RowLevel> {
             levels[0].recordings.insert(recording.name.clone());
             continue;
         };
-        let near = |level: &&mut RowLevel| (above - level.times.ln()).abs() < UNLIKE.ln();
+        let near = |level: &&mut RowLevel| (above - level.times.ln()).abs() < scatter::UNLIKE.ln();
         if let Some(level) = levels.iter_mut().skip(1).find(near) {
             level.recordings.insert(recording.name.clone());
         } else if recording.spec.usage == Usage::Validation {

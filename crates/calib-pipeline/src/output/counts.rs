@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use calib_profile::{BodyKind, ByRow, Contact, Usage};
-use calib_report::{HeldOut, Part, RejectedPart, Share, Unit};
+use calib_report::{HeldOut, Part, RejectedFor, RejectedPart, Share, Unit};
 
 use crate::formulate::formulation::MlFit;
 use crate::prepare::inputs::{Inputs, Loaded};
@@ -20,6 +20,8 @@ pub(crate) enum Fate {
     Rejected,
     /// It was excluded before the fit.
     Excluded,
+    /// It was excluded because the row has the joint readings of another one.
+    WithoutReadings,
     /// The tracker or a joint reading of its row was lost.
     Lost,
 }
@@ -50,6 +52,9 @@ pub(crate) fn fates(
         .filter(|pose| pose.screened)
         .map(|pose| (pose.pose.as_str(), pose.subject.as_str()))
         .collect();
+    let held = inputs.excluded.iter();
+    let held = held.filter(|out| out.cause == RejectedFor::HeldReadings);
+    let held: BTreeSet<(&str, usize)> = held.map(|out| (out.recording.as_str(), out.row)).collect();
     let mut out = Tracks::new();
     for (name, loaded) in &inputs.recordings {
         let validation = loaded.spec.usage == Usage::Validation;
@@ -57,7 +62,10 @@ pub(crate) fn fates(
             let key = (name.clone(), row, subject.to_owned());
             let pose = || format!("{name}:{}", loaded.poses.rows[row]);
             let usable = seen && loaded.q[row].is_some();
-            if inputs.taken_out.contains(&key) {
+            let is_out = inputs.taken_out.contains(&key);
+            if is_out && held.contains(&(name.as_str(), row)) {
+                Fate::WithoutReadings
+            } else if is_out {
                 Fate::Excluded
             } else if !usable {
                 Fate::Lost
@@ -144,7 +152,7 @@ pub(crate) fn count(fates: impl IntoIterator<Item = Fate>) -> calib_report::Fate
         match fate {
             Fate::Used => counted.used += 1,
             Fate::Rejected => counted.rejected += 1,
-            Fate::Excluded => counted.excluded += 1,
+            Fate::Excluded | Fate::WithoutReadings => counted.excluded += 1,
             Fate::Lost => counted.lost += 1,
         }
     }
@@ -159,7 +167,7 @@ pub(crate) fn rows(tracks: &[Track], rows: usize) -> Vec<Fate> {
         .collect()
 }
 
-/// Rejected and excluded measurements among those that were seen, over the fitted recordings.
+/// Rejected and excluded measurements among those that were seen, over the fitted recordings: what has no readings cannot be compared with a model.
 pub(crate) fn rejected_share(inputs: &Inputs, tracks: &Tracks) -> Share {
     let fitted = tracks
         .iter()
@@ -172,7 +180,8 @@ pub(crate) fn rejected_share(inputs: &Inputs, tracks: &Tracks) -> Share {
 }
 
 fn share(fates: impl IntoIterator<Item = Fate>) -> Share {
-    let counted = count(fates);
+    let fates = fates.into_iter();
+    let counted = count(fates.filter(|fate| *fate != Fate::WithoutReadings));
     Share {
         part: counted.rejected + counted.excluded,
         of: counted.of - counted.lost,

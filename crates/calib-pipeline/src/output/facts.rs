@@ -219,6 +219,15 @@ fn goodness(e: &Evidence<'_>, fit: &MlFit) -> Goodness {
         })
     });
     let beside: Vec<FoundNoise> = beside.collect();
+    let unstated = s.noise.iter().filter(|n| {
+        let stated = stated_sigma(&e.inputs.robot.profile, &n.name);
+        n.estimated && n.samples >= ENOUGH && n.kind == NoiseKind::Position && stated.is_none()
+    });
+    let above = unstated.filter_map(|n| {
+        let of_markers = n.name == "marker" || n.name.starts_with("marker ");
+        let rigid = rigid_of(&n.name).filter(|rigid| of_markers && *rigid > 0.0)?;
+        Some((n.name.clone(), n.sigma / rigid))
+    });
     let by_factor = |a: &&FoundNoise, b: &&FoundNoise| a.factor.total_cmp(&b.factor);
     let by_rows = |a: &&FoundNoise, b: &&FoundNoise| a.of_rows.total_cmp(&b.of_rows);
     Goodness {
@@ -226,5 +235,6 @@ fn goodness(e: &Evidence<'_>, fit: &MlFit) -> Goodness {
         band: Goodness::band_of(s.degrees_of_freedom),
         above_stated: beside.iter().max_by(by_factor).cloned(),
         below_stated: beside.iter().min_by(by_rows).cloned(),
+        above_scatter: above.max_by(|a, b| a.1.total_cmp(&b.1)),
     }
 }

@@ -5,8 +5,6 @@
 //! ones, and every σ would come out too small. Copies of a row are a special case: they agree in everything. Rows that
 //! return to a posture later are new measurements and stay. Of a slow motion neighbors are merged: their mean is as good a pose.
 
-use std::ops::Range;
-
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_geometry::mean::chordal_mean;
 use calib_profile::Usage;
@@ -34,57 +32,66 @@ pub fn merge(inputs: &mut Inputs) -> Vec<Finding> {
         if groups.len() == loaded.q.len() {
             continue;
         }
+        let poses = groups.iter().filter(|group| shows(loaded, group[0]));
+        let poses = poses.count();
         findings.push(
             Finding::new(
                 catalog::FRAMES_MERGED,
                 Subject::recording(loaded.name.clone()),
             )
             .with("rows", Fact::count(loaded.q.len()))
-            .with("poses", Fact::count(groups.len()))
+            .with("poses", Fact::count(poses))
             .with_some("copies", copies(loaded, &groups)),
         );
         merge_rows(loaded, &groups);
         moved.push((loaded.name.clone(), groups));
     }
     for (recording, groups) in moved {
-        for out in inputs
-            .excluded
-            .iter_mut()
-            .filter(|e| e.recording == recording)
-        {
-            out.row = groups
-                .iter()
-                .position(|g| g.contains(&out.row))
-                .unwrap_or(0);
+        let place = |row: usize| groups.iter().position(|g| g.contains(&row)).unwrap_or(0);
+        let excluded = inputs.excluded.iter_mut();
+        for out in excluded.filter(|out| out.recording == recording) {
+            out.row = place(out.row);
         }
+        let taken_out = std::mem::take(&mut inputs.taken_out).into_iter();
+        inputs.taken_out = taken_out
+            .map(|(of, row, subject)| {
+                let row = if of == recording { place(row) } else { row };
+                (of, row, subject)
+            })
+            .collect();
     }
     findings
 }
 
-/// Successive rows in which every joint stays within the jitter, where the bodies stood still meanwhile.
-fn postures(loaded: &Loaded) -> Vec<Range<usize>> {
-    let mut groups: Vec<Range<usize>> = Vec::new();
-    // Smallest and largest value of every joint in the last group.
-    let mut span: Vec<(f64, f64)> = Vec::new();
+/// Successive rows in which every joint stays within the jitter, where the bodies stood still meanwhile. A row that shows nothing is one of its own,
+/// and ends no posture.
+fn postures(loaded: &Loaded) -> Vec<Vec<usize>> {
+    let mut groups: Vec<Vec<usize>> = Vec::new();
+    // Group of the posture, and smallest and largest value of every joint in it.
+    let mut posture: Option<(usize, Vec<(f64, f64)>)> = None;
     for (row, q) in loaded.q.iter().enumerate() {
-        let wider = q.as_ref().map(|q| {
-            let both = span.iter().zip(q);
-            let wider = both.map(|(&(least, most), &q)| (least.min(q), most.max(q)));
-            wider.collect::<Vec<_>>()
+        if !shows(loaded, row) {
+            groups.push(vec![row]);
+            continue;
+        }
+        let own: Vec<(f64, f64)> = q.iter().flatten().map(|&q| (q, q)).collect();
+        let goes_on = posture.as_mut().filter(|(group, span)| {
+            let within = |((least, most), (q, _)): (&(f64, f64), &(f64, f64))| {
+                most.max(*q) - least.min(*q) <= JITTER
+            };
+            let rests = !own.is_empty() && span.len() == own.len();
+            rests && span.iter().zip(&own).all(within) && at_rest(loaded, groups[*group][0], row)
         });
-        let rests = |wider: &Vec<(f64, f64)>| {
-            let within = |(least, most): &(f64, f64)| most - least <= JITTER;
-            !wider.is_empty() && wider.iter().all(within)
-        };
-        match (groups.last_mut(), wider) {
-            (Some(group), Some(wider)) if rests(&wider) && at_rest(loaded, group.start, row) => {
-                group.end = row + 1;
-                span = wider;
+        match goes_on {
+            Some((group, span)) => {
+                groups[*group].push(row);
+                for ((least, most), (q, _)) in span.iter_mut().zip(own) {
+                    (*least, *most) = (least.min(q), most.max(q));
+                }
             }
-            _ => {
-                groups.push(row..row + 1);
-                let own = q.iter().flatten().map(|&q| (q, q));
-                span = own.collect();
+            None => {
+                posture = Some((groups.len(), own));
+                groups.push(vec![row]);
             }
         }
     }
@@ -92,12 +99,19 @@ fn postures(loaded: &Loaded) -> Vec<Range<usize>> {
 }
 
 /// Rows that repeat the row before in everything that was tracked.
-fn copies(loaded: &Loaded, groups: &[Range<usize>]) -> Option<Fact> {
-    let rows = groups.iter().flat_map(|group| group.start + 1..group.end);
-    let count = rows
-        .filter(|&row| agree(loaded, row - 1, row, COPIED))
+fn copies(loaded: &Loaded, groups: &[Vec<usize>]) -> Option<Fact> {
+    let pairs = groups.iter().flat_map(|group| group.windows(2));
+    let count = pairs
+        .filter(|pair| agree(loaded, pair[0], pair[1], COPIED))
         .count();
     (count > 0).then(|| Fact::count(count))
+}
+
+/// Whether anything was tracked in a row.
+fn shows(loaded: &Loaded, row: usize) -> bool {
+    let mut markers = loaded.poses.markers.values();
+    let mut bodies = loaded.poses.bodies.values();
+    markers.any(|track| track[row].is_some()) || bodies.any(|track| track[row].is_some())
 }
 
 /// Whether the body stood still between two rows.
@@ -127,54 +141,48 @@ fn agree(loaded: &Loaded, a: usize, b: usize, tolerance: f64) -> bool {
     markers && bodies
 }
 
-fn merge_rows(loaded: &mut Loaded, groups: &[Range<usize>]) {
-    let firsts: Vec<usize> = groups.iter().map(|g| g.start).collect();
+fn merge_rows(loaded: &mut Loaded, groups: &[Vec<usize>]) {
+    let firsts: Vec<usize> = groups.iter().map(|group| group[0]).collect();
     let all = &loaded.poses;
     let mut kept = all.select(&firsts);
     for (name, track) in &all.markers {
-        kept.markers.insert(
-            name.clone(),
-            groups
-                .iter()
-                .map(|g| mean_point(&track[g.clone()]))
-                .collect(),
-        );
+        let means = groups.iter().map(|group| mean_point(&frames(track, group)));
+        kept.markers.insert(name.clone(), means.collect());
     }
     for (name, track) in &all.bodies {
-        kept.bodies.insert(
-            name.clone(),
-            groups
-                .iter()
-                .map(|g| mean_pose(&track[g.clone()]))
-                .collect(),
-        );
+        let means = groups.iter().map(|group| mean_pose(&frames(track, group)));
+        kept.bodies.insert(name.clone(), means.collect());
     }
     loaded.q = groups
         .iter()
-        .map(|g| mean_values(&loaded.q[g.clone()]))
+        .map(|group| mean_values(group.iter().map(|row| loaded.q[*row].as_ref())))
         .collect();
     loaded.poses = kept;
 }
 
+/// What these rows show.
+fn frames<T: Copy>(track: &[Option<T>], rows: &[usize]) -> Vec<T> {
+    rows.iter().filter_map(|row| track[*row]).collect()
+}
+
 /// Of rows that all have joint values, or of a single one.
-fn mean_values(rows: &[Option<Vec<f64>>]) -> Option<Vec<f64>> {
-    let first = rows[0].as_ref()?;
+fn mean_values<'a>(rows: impl Iterator<Item = Option<&'a Vec<f64>>> + Clone) -> Option<Vec<f64>> {
+    let first = rows.clone().next()??;
+    let count = rows.clone().count() as f64;
     // About the first: equal values keep their last bit.
     let mean = |joint: usize| {
-        let off = rows.iter().flatten().map(|q| q[joint] - first[joint]);
-        first[joint] + off.sum::<f64>() / rows.len() as f64
+        let off = rows.clone().flatten().map(|q| q[joint] - first[joint]);
+        first[joint] + off.sum::<f64>() / count
     };
     Some((0..first.len()).map(mean).collect())
 }
 
-fn mean_point(frames: &[Option<Point3<f64>>]) -> Option<Point3<f64>> {
-    let seen: Vec<Vector3<f64>> = frames.iter().flatten().map(|p| p.coords).collect();
-    let sum: Vector3<f64> = seen.iter().sum();
+fn mean_point(seen: &[Point3<f64>]) -> Option<Point3<f64>> {
+    let sum: Vector3<f64> = seen.iter().map(|p| p.coords).sum();
     (!seen.is_empty()).then(|| Point3::from(sum / seen.len() as f64))
 }
 
-fn mean_pose(frames: &[Option<Isometry3<f64>>]) -> Option<Isometry3<f64>> {
-    let seen: Vec<&Isometry3<f64>> = frames.iter().flatten().collect();
+fn mean_pose(seen: &[Isometry3<f64>]) -> Option<Isometry3<f64>> {
     let rotations: Vec<UnitQuaternion<f64>> = seen.iter().map(|x| x.rotation).collect();
     let sum: Vector3<f64> = seen.iter().map(|x| x.translation.vector).sum();
     let rotation = chordal_mean(&rotations).ok()?;

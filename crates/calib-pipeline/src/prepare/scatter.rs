@@ -37,6 +37,26 @@ const OF_MEDIAN: f64 = 0.64;
 /// σ below this, m, is computed, not measured.
 const COMPUTED: f64 = 1e-7;
 
+/// A scatter counts as another one from this ratio of σ…
+pub(crate) const UNLIKE: f64 = 1.5;
+/// …and these standard errors of its logarithm on.
+const CERTAIN: f64 = 4.0;
+/// Variance of ln σ without outliers, times the number of values.
+const OF_LOG: f64 = 0.55;
+/// Values that a small scatter needs: half of a few values are often close together by chance, and the others pass for outliers.
+const SMALL: f64 = 20.0;
+
+impl Scatter {
+    /// How far ln σ is above that of another recording, where that is certain.
+    pub(crate) fn above(self, other: Self) -> Option<f64> {
+        let above = 0.5 * (self.variance / other.variance).ln();
+        let smaller = if above < 0.0 { self } else { other };
+        let error = (OF_LOG * (1.0 / self.values + 1.0 / other.values)).sqrt();
+        let differs = above.abs() > UNLIKE.ln() && above.abs() > CERTAIN * error;
+        (differs && smaller.values >= SMALL).then_some(above)
+    }
+}
+
 /// Equation (1): the median over all pairs and places, so that a loose marker is not taken for the tracker; `None` where nothing
 /// shows it.
 pub(crate) fn scatter(profile: &Profile, model: &RobotModel, poses: &Poses) -> Option<Scatter> {
@@ -122,4 +142,44 @@ fn variance(values: &[f64]) -> Option<f64> {
     let kept = off.iter().filter(|off| **off <= OUTLIER * sigma);
     let (sum, count) = kept.fold((0.0, 0.0), |(sum, n), off| (sum + off * off, n + 1.0));
     (count > 1.0).then(|| sum / (count - 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use rand::SeedableRng;
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::{Distribution, StandardNormal};
+
+    fn of(rng: &mut ChaCha8Rng, values: usize, sigma: f64) -> Scatter {
+        let one = |rng: &mut ChaCha8Rng| -> f64 { StandardNormal.sample(rng) };
+        let drawn: Vec<f64> = (0..values).map(|_| sigma * one(rng)).collect();
+        Scatter {
+            variance: variance(&drawn).expect("values that differ"),
+            values: values as f64,
+        }
+    }
+
+    /// Power and false alarms of 1000 pairs of recordings each.
+    #[test]
+    fn few_values_are_no_smaller_noise() {
+        let mut rng = ChaCha8Rng::seed_from_u64(17);
+        let mut share = |values: usize, others: usize, sigma: f64| {
+            let differ = (0..1000)
+                .filter(|_| {
+                    let own = of(&mut rng, values, sigma);
+                    own.above(of(&mut rng, others, 1.0)).is_some()
+                })
+                .count();
+            differ as f64 / 1000.0
+        };
+        for (values, others) in [(5, 24), (7, 24), (10, 10), (20, 24), (24, 200)] {
+            let false_alarms = share(values, others, 1.0);
+            assert!(false_alarms <= 3e-3, "{values}, {others}: {false_alarms}");
+        }
+        for (values, others, sigma) in [(10, 40, 5.0), (60, 60, 3.0), (60, 60, 1.0 / 3.0)] {
+            let power = share(values, others, sigma);
+            assert!(power >= 0.9, "{values}, {others}, {sigma}: {power}");
+        }
+    }
 }

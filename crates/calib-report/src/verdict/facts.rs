@@ -366,6 +366,9 @@ pub struct Goodness {
     pub above_stated: Option<FoundNoise>,
     /// The group whose noise is furthest below it.
     pub below_stated: Option<FoundNoise>,
+    /// The group of no stated noise that is furthest above the scatter of the markers about their own rigid bodies, in which no model of the robot is,
+    /// with the noise over this scatter.
+    pub above_scatter: Option<(String, f64)>,
 }
 
 /// A noise level of the fit beside the one that the profile states.

@@ -90,6 +90,8 @@ reasons! {
     NoiseAboveStated = "noise-above-stated": Warns,
     /// The noise that was found is far below the noise that was stated.
     NoiseBelowStated = "noise-below-stated": Warns,
+    /// No noise is stated, and the noise that was found is far above the scatter of the markers about their bodies.
+    NoiseAboveScatter = "noise-above-scatter": Warns,
     /// Held-out errors after registration only are not significantly higher.
     NotBetterThanRegistration = "not-better-than-registration": Warns,
     /// Too few held-out postures to tell whether the calibration is better than registration only.

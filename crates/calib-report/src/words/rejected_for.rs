@@ -11,6 +11,9 @@ impl RejectedFor {
                 "not settled: explained by interpolating the joint values toward an adjacent row"
             }
             Self::RestlessHold => "not settled: the hold drifts or scatters",
+            Self::HeldReadings => {
+                "the joint readings repeat those of an earlier row, and the body had moved"
+            }
             Self::NotSettled => {
                 "not settled: the whole body is displaced, or a joint reading is wrong"
             }

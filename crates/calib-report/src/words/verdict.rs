@@ -99,6 +99,7 @@ impl Reason {
             | ReasonId::GoodnessOfFit
             | ReasonId::NoiseAboveStated
             | ReasonId::NoiseBelowStated
+            | ReasonId::NoiseAboveScatter
             | ReasonId::UnresolvedError
             | ReasonId::WarningFinding => of_fit(self, &v),
             ReasonId::RejectedPart | ReasonId::RejectedShare | ReasonId::ScreenedHeldOut => {
@@ -215,6 +216,11 @@ fn of_fit(reason: &Reason, v: &Values<'_>) -> String {
         ),
         ReasonId::NoiseAboveStated => format!(
             "The estimated noise of {} is {} times the stated noise: the model is incomplete. The reported uncertainty includes the excess.",
+            v.name("group"),
+            v.number("factor")
+        ),
+        ReasonId::NoiseAboveScatter => format!(
+            "The estimated noise of {} is {} times the scatter of the markers about their own bodies: the model is incomplete, or a reading is wrong. The reported uncertainty includes the excess.",
             v.name("group"),
             v.number("factor")
         ),

@@ -43,6 +43,7 @@ fn clean() -> VerdictFacts {
             band: Goodness::band_of(800.0),
             above_stated: Some(found(1.1, None)),
             below_stated: Some(found(0.9, None)),
+            above_scatter: None,
         }),
         ..VerdictFacts::default()
     }
@@ -525,6 +526,13 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
             }),
         ),
         (
+            ReasonId::NoiseAboveScatter,
+            Warns,
+            with(|f| {
+                f.goodness.as_mut().expect("there").above_scatter = Some(("marker".into(), 6.0));
+            }),
+        ),
+        (
             ReasonId::SingleJointData,
             Warns,
             with(|f| {
@@ -667,6 +675,7 @@ fn every_rule_is_silent_on_the_other_side() {
         goodness.used = 1.45;
         goodness.above_stated = Some(found(2.0, None));
         goodness.below_stated = Some(found(0.5, None));
+        goodness.above_scatter = Some(("marker".into(), 5.0));
     });
     assert_eq!(
         judge(&near).verdict,

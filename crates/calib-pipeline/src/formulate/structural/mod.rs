@@ -47,18 +47,24 @@ pub struct Structural {
     pub couplings: Vec<Coupling>,
 }
 
+/// The nominal robot with the couplings that the profile declares; `None` where its joints are no tree.
+#[must_use]
+pub fn chain(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+) -> Option<(Chain, Vec<Coupling>)> {
+    let chain = Chain::from_model(&inputs.robot.model).ok()?;
+    let plain = Layout::new(inputs, tracks, &chain, false);
+    let couplings = declared::couplings(inputs, &plain.data);
+    Some((declared::coupled(chain, &couplings), couplings))
+}
+
 /// Asks the engine about the recordings.
 #[must_use]
 pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Structural {
-    // A model that was read is a tree.
-    let Ok(chain) = Chain::from_model(&inputs.robot.model) else {
+    let Some((chain, couplings)) = chain(inputs, tracks) else {
         return Structural::default();
     };
-    let couplings = {
-        let plain = Layout::new(inputs, tracks, &chain, false);
-        declared::couplings(inputs, &plain.data)
-    };
-    let chain = declared::coupled(chain, &couplings);
     let layout = Layout::new(inputs, tracks, &chain, false);
     let mut found = Structural {
         findings: Vec::new(),

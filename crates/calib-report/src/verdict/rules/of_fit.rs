@@ -105,6 +105,10 @@ const ABOVE_STATED: f64 = 2.0;
 /// Found noise below this part of the stated one says that the stated one is wrong.
 const BELOW_STATED: f64 = 0.5;
 
+/// The same over the scatter of the markers about their own bodies, where nothing is stated: what all markers of a body share, as errors of a tracker's
+/// volume, does not show in it.
+const ABOVE_SCATTER: f64 = 5.0;
+
 /// From this part of the excess on, the scatter about the rigid bodies explains it.
 const EXPLAINS: f64 = 0.8;
 
@@ -128,5 +132,12 @@ pub(super) fn stated_noise(facts: &Facts) -> Vec<Reason> {
     let below = goodness.below_stated.as_ref();
     let below = below.filter(|found| found.of_rows < BELOW_STATED);
     let below = below.map(|found| reason(ReasonId::NoiseBelowStated, found, found.of_rows));
-    above.into_iter().chain(below).collect()
+    let scatter = goodness.above_scatter.as_ref();
+    let scatter = scatter.filter(|(_, factor)| *factor > ABOVE_SCATTER);
+    let scatter = scatter.map(|(group, factor)| {
+        Reason::new(ReasonId::NoiseAboveScatter, Effect::Warns)
+            .with("group", Fact::name(group))
+            .with("factor", Fact::ratio(*factor))
+    });
+    above.into_iter().chain(below).chain(scatter).collect()
 }
