@@ -40,19 +40,19 @@ fn joined(header: &[String], tracked: &[String], joints: &[String]) -> Vec<Strin
         .collect()
 }
 
-/// The readings of the row before each range stay through it; rows are counted from 0.
-fn held(dir: Scratch, table: &str, ranges: &[std::ops::Range<usize>]) -> Scratch {
+/// The readings of the row before each range stay through it: rows from one to before another, counted from 0.
+fn held(dir: Scratch, table: &str, ranges: &[(usize, usize)]) -> Scratch {
     rewritten(dir, table, |k, header, rows| {
-        let range = ranges.iter().find(|range| range.contains(&k));
-        let reported = range.map_or(k, |range| range.start - 1);
+        let range = ranges.iter().find(|(from, to)| (*from..*to).contains(&k));
+        let reported = range.map_or(k, |(from, _)| from - 1);
         vec![joined(header, &rows[k], &rows[reported])]
     })
 }
 
 /// As if the tracker had seen nothing in these rows.
-fn lost(dir: Scratch, table: &str, ranges: &[std::ops::Range<usize>]) -> Scratch {
+fn lost(dir: Scratch, table: &str, ranges: &[(usize, usize)]) -> Scratch {
     rewritten(dir, table, |k, header, rows| {
-        let is_lost = ranges.iter().any(|range| range.contains(&k));
+        let is_lost = ranges.iter().any(|(from, to)| (*from..*to).contains(&k));
         let cells = header.iter().zip(&rows[k]);
         let cells = cells.map(|(name, cell)| match is_lost && name.ends_with("_m") {
             true => String::new(),
@@ -103,13 +103,17 @@ const TWO: Markers = &[[20.0, 30.0, 10.0], [70.0, -20.0, 15.0]];
 #[test]
 fn rows_of_a_log_that_hung_are_left_out() {
     /// Which readings stay, of which table.
-    type Case = (Design, &'static str, &'static [std::ops::Range<usize>]);
+    type Case = (Design, &'static str, &'static [(usize, usize)]);
     let cases: [Case; 5] = [
-        (Design::Random(24), "poses", &[8..13]),
-        (Design::Random(24), "poses", &[3..4, 9..10, 15..17, 20..21]),
-        (Design::Random(24), "checks", &[5..8]),
-        (Design::Sweeps, "elbow", &[3..6]),
-        (Design::Sweeps, "waist", &[1..2, 3..4, 5..6]),
+        (Design::Random(24), "poses", &[(8, 13)]),
+        (
+            Design::Random(24),
+            "poses",
+            &[(3, 4), (9, 10), (15, 17), (20, 21)],
+        ),
+        (Design::Random(24), "checks", &[(5, 8)]),
+        (Design::Sweeps, "elbow", &[(3, 6)]),
+        (Design::Sweeps, "waist", &[(1, 2), (3, 4), (5, 6)]),
     ];
     for (seed, (design, table, ranges)) in cases.into_iter().enumerate() {
         for markers in [ONE, TWO, FOUR] {
@@ -121,7 +125,7 @@ fn rows_of_a_log_that_hung_are_left_out() {
             let first = first_line(&dir, table);
             let rows: Vec<u64> = ranges
                 .iter()
-                .flat_map(|r| first + r.start as u64..first + r.end as u64)
+                .flat_map(|(from, to)| first + *from as u64..first + *to as u64)
                 .collect();
             let (report, urdf) = calibrated(&dir);
             let (of_lost, without) = calibrated(&lost(setting.folder(), table, ranges));
