@@ -89,6 +89,38 @@ fn clock(report: &Value) -> Value {
     own.expect("the streams' recording").clone()
 }
 
+/// The robot's log repeats its readings for half a second, ten times, on the tracker's clock or on its own: rows of these times are left out, and the robot
+/// is the true one.
+#[test]
+fn a_log_that_hung_in_a_motion_is_named() {
+    let robot = ripley();
+    for (offset, drift, timing) in [
+        (0.0, 0.0, "{poses: continuous, clock: shared}"),
+        (OFFSET, DRIFT, "{poses: continuous}"),
+    ] {
+        let plan = StreamPlan {
+            offset,
+            drift,
+            ..plan(&robot, Motion::Continuous, 60.0)
+        };
+        let mut streams =
+            simulate_streams(&robot.profile, &robot.model, &plan, SEED).expect("a section");
+        let rows = streams.robot.rows.len();
+        for joint in streams.robot.joints.values_mut() {
+            for start in (300..rows - 80).step_by(700) {
+                let last = joint[start];
+                joint[start..start + 63].fill(last);
+            }
+        }
+        let dir = with_streams(&streams, timing);
+        let report = run(&dir);
+        let found = report["findings"].as_array().expect("a list");
+        let held = found.iter().filter(|f| f["id"] == "joint-readings-held");
+        assert_eq!(held.count(), 1, "{timing}: {found:#?}");
+        is_true(&dir, &report);
+    }
+}
+
 #[test]
 fn a_motion_with_two_clocks_gives_offset_drift_and_the_truth() {
     if !skipped_tests::thorough() {

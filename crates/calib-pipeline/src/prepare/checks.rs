@@ -9,6 +9,7 @@ use calib_core::effect::{Drives, Effect, Source};
 use calib_finding::{About, Fact, Finding, Severity, Subject, Unit, catalog};
 use calib_profile::{BodyKind, Contact, Free, JointFree, Load, Usage};
 use calib_recording::Poses;
+use calib_report::RejectedFor;
 use calib_urdf::JointId;
 
 use crate::prepare::conditions::{missing_temperatures, missing_torques};
@@ -26,7 +27,14 @@ pub fn check(inputs: &Inputs) -> Vec<Finding> {
         let tracked = without_coordinates(inputs, loaded);
         let missing = missing_bodies(inputs, loaded).into_iter();
         findings.extend(missing.map(|finding| finding.in_recording(name)));
-        for mut finding in checks(&tracked, &expectations(inputs, loaded)) {
+        let mut of_data = checks(&tracked, &expectations(inputs, loaded));
+        // Rows that this took out had been seen.
+        if let Some(rest) = without_held(inputs, loaded, &tracked) {
+            of_data.retain(|f| f.id != catalog::MANY_LOST);
+            let of_rest = checks(&rest, &expectations(inputs, loaded)).into_iter();
+            of_data.extend(of_rest.filter(|f| f.id == catalog::MANY_LOST));
+        }
+        for mut finding in of_data {
             let same = |earlier: &&mut Finding| {
                 earlier.id == catalog::MISSING_MARKER
                     && earlier.facts == finding.facts
@@ -81,6 +89,20 @@ fn without_coordinates<'a>(inputs: &Inputs, loaded: &'a Loaded) -> Cow<'a, Poses
         }
     }
     poses
+}
+
+/// The rows that do not have the joint readings of another one; `None` where that is all of them.
+fn without_held(inputs: &Inputs, loaded: &Loaded, tracked: &Poses) -> Option<Poses> {
+    let out = inputs.excluded.iter();
+    let out = out.filter(|out| out.recording == loaded.name);
+    let held: BTreeSet<usize> = out
+        .filter(|out| out.cause == RejectedFor::HeldReadings)
+        .map(|out| out.row)
+        .collect();
+    let rest: Vec<usize> = (0..tracked.len())
+        .filter(|row| !held.contains(row))
+        .collect();
+    (!held.is_empty()).then(|| tracked.select(&rest))
 }
 
 /// Rows that a recording needs. Static poses may be spread over as many recordings as one likes.

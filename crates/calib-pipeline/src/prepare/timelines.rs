@@ -9,6 +9,7 @@ use calib_checks::sync::{
     clock_offset_of_point,
 };
 use calib_finding::{About, Fact, Finding, catalog};
+use calib_geometry::statistics::median;
 use calib_profile::{BodyKind, RecordingSpec, Timing};
 use calib_recording::{Filled, Poses, Recording};
 use calib_urdf::LinkId;
@@ -288,7 +289,41 @@ fn link_poses(
         }
         Some(robot.model.root_from_link(&q, link))
     };
-    times.iter().map(|&t| (t, pose(t))).collect()
+    let mut track: Vec<_> = times.iter().map(|&t| (t, pose(t))).collect();
+    blank_hung(&mut track);
+    track
+}
+
+/// Poses that repeat while a step of so many usual ones follows are those of a log that hung: a robot that was at rest sets out slowly.
+const HUNG: f64 = 5.0;
+
+/// Takes poses out that repeat those of a log that hung: the motion went on, and its speed is not theirs.
+fn blank_hung(track: &mut [(f64, Option<Isometry3<f64>>)]) {
+    let step = |a: &Option<Isometry3<f64>>, b: &Option<Isometry3<f64>>| {
+        let motion = a.as_ref()?.inv_mul(b.as_ref()?);
+        Some(motion.rotation.angle() + motion.translation.vector.norm())
+    };
+    let steps: Vec<Option<f64>> = track.windows(2).map(|w| step(&w[0].1, &w[1].1)).collect();
+    let same: Vec<bool> = track
+        .windows(2)
+        .map(|w| w[0].1.is_some() && w[0].1 == w[1].1)
+        .collect();
+    let moving = steps.iter().zip(&same).filter(|(_, same)| !**same);
+    let Some(usual) = median(moving.filter_map(|(step, _)| *step).collect()) else {
+        return;
+    };
+    let mut first = 0;
+    for k in 0..same.len() {
+        if same[k] {
+            continue;
+        }
+        if steps[k].is_some_and(|step| step > HUNG * usual) {
+            for (_, pose) in &mut track[first + 1..=k] {
+                *pose = None;
+            }
+        }
+        first = k + 1;
+    }
 }
 
 /// The markers of a body over the tracker's time.
