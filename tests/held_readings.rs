@@ -158,6 +158,23 @@ fn rows_of_a_log_that_hung_are_left_out() {
     }
 }
 
+#[test]
+fn a_log_that_hung_in_every_recording_is_named_in_each() {
+    let setting = Setting {
+        validation: true,
+        ..Setting::new(Design::Sweeps, FOUR, 85)
+    };
+    let tables = ["checks", "elbow", "shoulder", "wrist_roll"];
+    let dir = tables
+        .iter()
+        .fold(setting.folder(), |dir, table| held(dir, table, &[(3, 6)]));
+    let checked = dir.calib(["check", "arm.yaml", "--json"]).json();
+    let all = checked["findings"].as_array().expect("a list");
+    let mut found: Vec<String> = found(all).into_iter().map(|(table, _)| table).collect();
+    found.sort();
+    assert_eq!(found, tables, "{all:#?}");
+}
+
 /// Elbow and wrist roll moved on a grid.
 const GRID: &str = "{grid: [{joint: elbow_deg, from: -20, to: 100, poses: 6}, {joint: wrist_roll_deg, from: -80, to: 80, poses: 4}], \
                     hold: {waist_deg: 20, shoulder_deg: -35, wrist_pitch_deg: -30}}";

@@ -71,8 +71,8 @@ pub fn take_out(inputs: &mut Inputs) -> Vec<Finding> {
     let all = inputs.recordings.values();
     let suspected: Vec<Held> = all.filter_map(|r| held(inputs, r)).collect();
     let mut findings = Vec::new();
-    for held in suspected {
-        let Some((first, last)) = residuals(inputs, &held) else {
+    for held in &suspected {
+        let Some((first, last)) = residuals(inputs, held, &suspected) else {
             continue;
         };
         let loaded = &inputs.recordings[&held.recording];
@@ -267,18 +267,23 @@ fn is_rounded(inputs: &Inputs, loaded: &Loaded, runs: &[Range<usize>]) -> bool {
     2 * small > steps.len()
 }
 
-/// Residuals of the registration with the first and with the last row of every run, rms, m; `None` where equation (1) does not hold.
-fn residuals(inputs: &Inputs, held: &Held) -> Option<(f64, f64)> {
+/// Residuals of the registration with the first and with the last row of every run, rms, m; `None` where equation (1) does not hold. Runs of other
+/// recordings that are suspected, too, are left out.
+fn residuals(inputs: &Inputs, held: &Held, suspected: &[Held]) -> Option<(f64, f64)> {
     let tracks = body_tracks(inputs, &mut Vec::new()).ok()?;
     let (chain, _) = chain(inputs, &tracks)?;
     let validation = inputs.recordings[&held.recording].spec.usage == Usage::Validation;
     let layout = Layout::new(inputs, &tracks, &chain, validation);
-    let is_own = |i: &usize| {
-        let recording = layout.data.recording[*i];
-        layout.recordings[recording.0].name == held.recording
-    };
-    let all = 0..layout.rows.len();
-    let (own, others): (Vec<usize>, Vec<usize>) = all.partition(is_own);
+    let name = |i: usize| layout.recordings[layout.data.recording[i].0].name.as_str();
+    let elsewhere = suspected.iter().filter(|s| s.recording != held.recording);
+    let elsewhere: BTreeSet<(&str, usize)> = elsewhere
+        .flat_map(|other| {
+            let rows = other.runs.iter().cloned().flatten();
+            rows.map(|row| (other.recording.as_str(), row))
+        })
+        .collect();
+    let all = (0..layout.rows.len()).filter(|i| !elsewhere.contains(&(name(*i), layout.rows[*i])));
+    let (own, others): (Vec<usize>, Vec<usize>) = all.partition(|i| name(*i) == held.recording);
     let runs = held.runs.iter();
     let run_of: BTreeMap<usize, &Range<usize>> = runs
         .flat_map(|run| run.clone().map(move |row| (row, run)))
