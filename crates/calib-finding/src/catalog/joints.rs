@@ -119,7 +119,7 @@ super::topic! {
     JOINT_READINGS_HELD = "joint-readings-held" {
         "": Warning,
             "In {rows} of {of:row} all joint readings repeat those of an earlier row, but the bodies moved by up to {distance} meanwhile: left out. Of rows with the same readings, the first fits the nominal robot ({first} rms with all other rows), the last does not ({last}).",
-            "Look for what stopped or slowed the log of the joints, or moved the bodies beside them. Record again if too few rows are left.";
+            "Look for what stopped or slowed the log of the joints, or what else moved the bodies. Record again if too few rows are left.";
     }
     /// Two joints are equal in every row.
     JOINT_DUPLICATE = "joint-duplicate" {

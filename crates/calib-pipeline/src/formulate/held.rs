@@ -1,7 +1,7 @@
 //! Joint readings that were held: the robot moved on, and its log repeated the readings of an earlier row.
 //!
 //! A log that hangs, or that is slower than the tracker, writes the same readings into several rows. A run of such rows is suspicious where a body moves within
-//! it by a good part of a usual step, what stands still does not move with it, and everything that the robot reports stays the same to the last bit. Which
+//! it by a tenth of a usual step or more, to three places, what stands still does not move with it, and everything that the robot reports stays the same to the last bit. Which
 //! row of a run has the readings that are right is asked of the nominal robot: with `S_first` the squared residuals of the registration that has
 //! the first row of every run beside the rows of no run, `S_last` that with the last, `N` samples each,
 //!
