@@ -16,12 +16,13 @@ use std::collections::{BTreeMap, BTreeSet};
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_geometry::so3;
 use calib_profile::Usage;
-use calib_urdf::{JointId, JointKind, RobotModel};
+use calib_urdf::RobotModel;
 use nalgebra::{Isometry3, Vector6};
 use rayon::prelude::*;
 
 use crate::formulate::formulation::MlFit;
 use crate::formulate::row_levels::row_levels;
+use crate::formulate::standing::{OneJoint, standing};
 use crate::formulate::starts::rows_of_no_side;
 use crate::prepare::conditions::{Conditions, conditions};
 use crate::prepare::excluded::Excluded;
@@ -39,10 +40,6 @@ const LARGEST_FRACTION: f64 = 0.5;
 const FAR_OFF: f64 = 3.0;
 /// One joint alone explains a row when it leaves no more than this of the squared error.
 const ONE_JOINT_LEFT: f64 = 0.3;
-/// Places of a joint that are not the same one, rad and m: a degree, two millimeters.
-const PLACES_APART: (f64, f64) = (0.0175, 2e-3);
-/// Places that a joint has moved to where it did not slip, or stand elsewhere, once.
-const PLACES: usize = 3;
 /// Median and σ of the length of a Gaussian 3-vector: √χ²₃(½).
 const MEDIAN_OF_THREE: f64 = 1.538;
 
@@ -113,9 +110,17 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
             }
             bad.findings
                 .extend(unsettled_finding(recording, name, loaded, &moving));
-            let outliers = standing_finding(inputs, loaded, name, &others)
-                .or_else(|| outlier_finding(&inputs.robot.model, name, loaded, &others));
-            bad.findings.extend(outliers);
+            let explained: Vec<(usize, OneJoint)> = others
+                .iter()
+                .filter_map(|(row, off)| Some((*row, off.joint?)))
+                .collect();
+            let model = &inputs.robot.model;
+            if let Some(standing) = standing(model, loaded, &explained) {
+                others.retain(|(row, _)| !standing.rows.contains(row));
+                bad.findings.push(standing.finding(model, name, loaded));
+            }
+            bad.findings
+                .extend(outlier_finding(model, name, loaded, &others));
             bad.unsettled.extend(moving.iter().map(|(row, _)| Excluded {
                 recording: recording.clone(),
                 row: *row,
@@ -183,53 +188,6 @@ fn unsettled_finding(
     )
 }
 
-/// The finding about a joint that moved although all its readings are the same: an error of it explains the rows, and is another one from row to row. A body
-/// that slipped once on its link, or a joint that stood elsewhere, is off by the same in all of them.
-fn standing_finding(
-    inputs: &Inputs,
-    loaded: &Loaded,
-    body: &str,
-    rows: &[(usize, FarOff)],
-) -> Option<Finding> {
-    let model = &inputs.robot.model;
-    let mut moved: BTreeMap<JointId, Vec<f64>> = BTreeMap::new();
-    for of in rows.iter().filter_map(|(_, off)| off.joint) {
-        moved.entry(of.joint).or_default().push(of.step);
-    }
-    let (joint, mut steps) = moved.into_iter().max_by_key(|(_, steps)| steps.len())?;
-    let mut readings = loaded.q.iter().flatten().map(|q| q[joint.index()]);
-    let at = readings.next()?;
-    if 2 * steps.len() < rows.len() || !readings.all(|reading| reading == at) {
-        return None;
-    }
-    // The other rows are off by nothing.
-    steps.push(0.0);
-    steps.sort_by(f64::total_cmp);
-    let turns = !matches!(model.joint(joint).kind, JointKind::Prismatic { .. });
-    let (apart, size): (f64, fn(f64) -> Fact) = match turns {
-        true => (PLACES_APART.0, Fact::radians),
-        false => (PLACES_APART.1, Fact::meters),
-    };
-    let places = 1 + steps.windows(2).filter(|w| w[1] - w[0] > apart).count();
-    if places < PLACES {
-        return None;
-    }
-    let name = &model.joint(joint).name;
-    Some(
-        Finding::of_kind(
-            catalog::JOINT_NEVER_MOVED,
-            "although",
-            Subject::joint(name).in_recording(&loaded.name),
-        )
-        .with("at", size(at))
-        .with("count", Fact::count(rows.len()))
-        .with("of", Fact::count(loaded.q.len()))
-        .with("body", Fact::name(body))
-        .with("moved", size(steps[steps.len() - 1] - steps[0]))
-        .at_rows(rows.iter().map(|(row, _)| loaded.poses.rows[*row])),
-    )
-}
-
 fn outlier_finding(
     model: &RobotModel,
     body: &str,
@@ -272,16 +230,6 @@ struct FarOff {
     angle: f64,
     /// The joint whose error alone would explain it.
     joint: Option<OneJoint>,
-}
-
-/// An error of one joint.
-#[derive(Clone, Copy)]
-struct OneJoint {
-    joint: JointId,
-    /// rad or m.
-    step: f64,
-    /// Part of a row's squared error that it leaves.
-    left: f64,
 }
 
 /// Usual size of rotation, rad, and position, m, errors per component.

@@ -15,7 +15,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::ops::Range;
 
-use calib_checks::structural::registration_residual;
+use calib_checks::structural::{Options, registration_residual};
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_geometry::statistics::{median, upper_median};
 use calib_profile::{Body, BodyKind, Usage};
@@ -27,8 +27,6 @@ use crate::prepare::excluded::Excluded;
 use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::tracks::body_tracks;
 
-/// Noise of a marker where nothing states it, m: of an optical tracker.
-const MARKER_SIGMA: f64 = 3e-4;
 /// Two rows of a body at rest differ by less than this many σ of a marker.
 const AT_REST_SIGMAS: f64 = 8.0;
 /// Least motion that is no sway, sag or backlash of a robot at rest, m.
@@ -125,7 +123,7 @@ fn held(inputs: &Inputs, loaded: &Loaded) -> Option<Held> {
         return None;
     }
     let sigma = inputs.robot.profile.tracker.marker_sigma;
-    let at_rest = AT_REST_SIGMAS * sigma.unwrap_or(MARKER_SIGMA);
+    let at_rest = AT_REST_SIGMAS * sigma.unwrap_or(Options::default().sigma);
     let largest = |bodies: &[(&String, &Body)], a: usize, b: usize| {
         let moved = bodies.iter().filter_map(|of| displaced(loaded, *of, a, b));
         moved.reduce(f64::max)

@@ -28,6 +28,7 @@ pub mod row_checks;
 pub(crate) mod row_levels;
 pub mod selection;
 pub mod solved;
+mod standing;
 pub(crate) mod starts;
 pub mod structural;
 mod wanted;
