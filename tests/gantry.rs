@@ -193,3 +193,68 @@ fn a_large_share_between_unlike_joints_is_said_in_its_unit() {
         assert!(text.contains(shown) && !text.contains('%'), "{text}");
     }
 }
+
+/// The tables of a robot whose joints are called otherwise, and without the columns of some.
+fn recorded(dir: &Scratch, file: &str, without: &str) -> String {
+    let text = dir.read(file);
+    let mut kept = Vec::new();
+    let mut rows = Vec::new();
+    for (i, line) in text.lines().enumerate() {
+        let cells: Vec<&str> = line.split(',').collect();
+        if i == 0 {
+            kept = (0..cells.len())
+                .filter(|k| cells[*k].split('_').next() != Some(without))
+                .collect();
+        }
+        let cells: Vec<&str> = kept.iter().map(|k| cells[*k]).collect();
+        rows.push(cells.join(","));
+    }
+    rows.join("\n") + "\n"
+}
+
+/// Of each sliding joint the column was forgotten: it is named, and neither the tracker nor a limit is blamed.
+#[test]
+fn a_sliding_joint_that_moved_without_a_column_is_named() {
+    for joint in ["gx", "gy", "gz"] {
+        let mut dir = gantry(None, 3);
+        for file in ["gantry/poses.csv", "gantry/checks.csv"] {
+            let text = recorded(&dir, file, joint);
+            dir = dir.file(file, text);
+        }
+        let said = dir.calib(["check", "gantry.yaml"]).expect(3).stdout;
+        let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(
+            said.contains(&format!("{joint} [joint-column-missing]")),
+            "{said}"
+        );
+        assert!(
+            said.contains(&format!("if joint `{joint}`, which has no column, moved")),
+            "{said}"
+        );
+    }
+}
+
+/// Joints that are called like coordinates: their columns are no marker.
+#[test]
+fn a_gantry_whose_joints_are_called_x_y_and_z_is_read() {
+    let coordinates = |text: &str| {
+        ["x", "y", "z"].iter().fold(text.to_owned(), |text, axis| {
+            text.replace(&format!("g{axis}_m"), &format!("{axis}_m"))
+                .replace(&format!("\"g{axis}\""), &format!("\"{axis}\""))
+        })
+    };
+    let mut dir = gantry(None, 3);
+    for file in [
+        "gantry/gantry.urdf",
+        "gantry/poses.csv",
+        "gantry/checks.csv",
+    ] {
+        let text = coordinates(&dir.read(file));
+        dir = dir.file(file, text);
+    }
+    let report = run(&dir);
+    assert_eq!(report["verdict"], "accepted", "{:#}", report["findings"]);
+    let named = gantry(None, 3);
+    let residual = |report: &Value| report["fit"]["chi2_per_dof"].as_f64().expect("a number");
+    assert_eq!(residual(&report), residual(&run(&named)));
+}

@@ -1,17 +1,13 @@
 //! What laboratories do to recordings without meaning to, through the program: rows written twice, noise with a memory,
 //! joint values that lag behind.
 
+use crate::late_joints::lagging;
 use crate::scratch;
 
-use std::collections::BTreeMap;
-
-use calib_pipeline::prepare::load::load_robot;
-use calib_recording::{Poses, WriteOptions, write_poses};
-use calib_sim::{Motion, StreamPlan, simulate_streams};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
-use scratch::{Ran, Scratch, root};
+use scratch::{Ran, Scratch};
 use serde_json::Value;
 
 const PROFILE: &str = "robots/ripley.yaml";
@@ -92,61 +88,12 @@ fn noise_with_a_memory_is_said_and_widens_the_uncertainty() {
     assert_ne!(report["verdict"], "accepted");
 }
 
-/// Joint values of a motion at 0.4 rad/s that are older than the markers of their row, by `lag` s.
-fn lagging(lag: f64) -> Scratch {
-    let robot = load_robot(&root().join(PROFILE)).expect("shipped");
-    let ranges: [(&str, f64, f64); 5] = [
-        ("waist", -70.0, 170.0),
-        ("shoulder", -100.0, 20.0),
-        ("elbow", -20.0, 120.0),
-        ("wrist_pitch", -90.0, 90.0),
-        ("wrist_roll", -100.0, 100.0),
-    ];
-    let plan = StreamPlan {
-        motion: Motion::Continuous,
-        ranges: ranges
-            .into_iter()
-            .map(|(joint, low, high)| {
-                let id = robot.model.joint_id(joint).expect("of the robot");
-                (id, (low.to_radians(), high.to_radians()))
-            })
-            .collect(),
-        bodies: robot.profile.bodies.keys().cloned().collect(),
-        duration: 20.0,
-        tracker_hz: 10.0,
-        robot_hz: 500.0,
-        offset: 0.0,
-        drift: 0.0,
-    };
-    let streams = simulate_streams(&robot.profile, &robot.model, &plan, 17).expect("a section");
-    let mut table: Poses = streams.tracker;
-    let (at, old) = (
-        table.t.clone().expect("timed"),
-        streams.robot.t.as_ref().expect("timed"),
-    );
-    let mut joints = BTreeMap::new();
-    for (name, values) in &streams.robot.joints {
-        let column = at.iter().map(|t| {
-            let t = t - lag;
-            let after = old.partition_point(|o| *o <= t).clamp(1, old.len() - 1);
-            let share = (t - old[after - 1]) / (old[after] - old[after - 1]);
-            let (a, b) = (values[after - 1]?, values[after]?);
-            Some(a + share * (b - a))
-        });
-        joints.insert(name.clone(), column.collect());
-    }
-    table.joint_units = streams.robot.joint_units.clone();
-    table.joints = joints;
-    let text = write_poses(&table, &WriteOptions::micro()).expect("plain names");
-    Scratch::new().brief("ripley").file(POSES, text)
-}
-
 #[test]
 fn joint_values_that_lag_behind_in_one_file_are_named() {
     if !skipped_tests::thorough() {
         return;
     }
-    let (_, clean) = run(&lagging(0.0));
+    let (_, clean) = run(&lagging(|_| 0.0));
     for id in [
         "clock-lag",
         "joint-coupling",
@@ -155,7 +102,7 @@ fn joint_values_that_lag_behind_in_one_file_are_named() {
     ] {
         assert!(finding(&clean, id).is_none(), "{:#}", clean["findings"]);
     }
-    let (_, report) = run(&lagging(0.008));
+    let (_, report) = run(&lagging(|_| 0.008));
     assert_ne!(report["verdict"], "accepted");
     let lag = finding(&report, "clock-lag").expect("named");
     assert_eq!(lag["facts"]["recording"], "arm_poses", "{lag:#}");

@@ -30,6 +30,7 @@ mod init_edit;
 mod inputs;
 mod interruptions;
 mod laboratory;
+mod late_joints;
 mod layering;
 mod loads;
 mod many_markers;

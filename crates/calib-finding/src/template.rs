@@ -1,7 +1,7 @@
 //! Sentences with places for values.
 //!
 //! `{key}` stands for a value: a number in the unit that people read, with three significant digits; `{key:um}` for a
-//! number in that unit; `{key} ± {sigma}` for a value with the digits that its standard deviation leaves; `{key:row}` for a count with its noun (`1 row`, `2 rows`). `[[ … ]]` is left out unless every
+//! number in that unit; `{key:yaml-ms}` for milliseconds as YAML has them, without the unit; `{key} ± {sigma}` for a value with the digits that its standard deviation leaves; `{key:row}` for a count with its noun (`1 row`, `2 rows`). `[[ … ]]` is left out unless every
 //! value in it is known.
 
 use crate::{Fact, Facts, Unit, number, printable_line};
@@ -142,6 +142,9 @@ fn scale(unit: Unit, form: &str) -> (f64, &'static str) {
 
 /// A number in the unit that `form` names, else in the unit that people read.
 fn lone(value: f64, unit: Unit, form: &str) -> String {
+    if form == "yaml-ms" {
+        return format!("{:.1}", value * 1e3);
+    }
     let (factor, suffix) = scale(unit, form);
     format!("{}{suffix}", significant(value * factor))
 }
@@ -182,6 +185,7 @@ mod tests {
         facts.insert("lost", Fact::count(0));
         facts.insert("markers", Fact::names(["a", "b"]));
         facts.insert("nan", Fact::meters(f64::NAN));
+        facts.insert("late", Fact::seconds(-0.012_34));
         facts
     }
 
@@ -194,6 +198,7 @@ mod tests {
         );
         assert_eq!(said("{angle}, {angle:rad}"), "−30°, −0.524 rad");
         assert_eq!(said("{rows:row} of {lost:row}"), "1 row of 0 rows");
+        assert_eq!(said("{late: {late:yaml-ms}}"), "{late: -12.3}");
         assert_eq!(
             said("{markers:exchange}; {markers:code}"),
             "a ↔ b; `a`, `b`"

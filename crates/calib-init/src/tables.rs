@@ -124,7 +124,7 @@ pub fn far_clocks(
         };
         let wide = Timing {
             max_offset: least.abs().max(most.abs()) + ROOM,
-            ..*timing
+            ..timing.clone()
         };
         // What says no of all offsets is said by the usual ones.
         let Ok(aligned) = try_it(&wide) else { continue };

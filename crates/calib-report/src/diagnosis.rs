@@ -189,7 +189,7 @@ fn named(report: &Report) -> Option<Diagnosis> {
     })
 }
 
-/// A clock explains most of what the model lacks; where an error was found it must have been seen before the fit, too.
+/// A clock, or readings of a joint that are late, explain most of what the model lacks; where an error was found it must have been seen before the fit, too.
 fn clock_offset(report: &Report) -> Option<Diagnosis> {
     let missing = report.findings.iter();
     let missing = missing.filter(|f| f.id == catalog::MISSING_PHYSICS);
@@ -198,12 +198,22 @@ fn clock_offset(report: &Report) -> Option<Diagnosis> {
         let [a, b] = [a, b].map(|f| explains(f).unwrap_or(0.0));
         a.total_cmp(&b)
     })?;
-    let recording = most.facts.get("recording").and_then(Fact::word)?;
+    let word = |f: &crate::Finding, key| f.facts.get(key).and_then(Fact::word).map(str::to_owned);
     let mut findings = report.findings.iter();
-    let seen_before = report.findings.iter().any(|f| f.id == catalog::CLOCK_LAG);
+    let seen_before = findings.clone().find(|f| f.id == catalog::CLOCK_LAG);
     let error = findings.any(|f| f.severity == Severity::Error && f.id != catalog::MISSING_PHYSICS);
-    (seen_before || !error).then(|| Diagnosis::ClockOffset {
-        recording: recording.to_owned(),
+    if seen_before.is_none() && error {
+        return None;
+    }
+    if let Some(recording) = word(most, "recording") {
+        return Some(Diagnosis::ClockOffset { recording });
+    }
+    // Of one joint: as it was found before the fit, where it was.
+    most.facts.get("late")?;
+    let same = |f: &&crate::Finding| word(f, "joint") == word(most, "joint");
+    let of = seen_before.filter(same).map_or(most.id, |f| f.id);
+    Some(Diagnosis::NamedCause {
+        evidence: of.as_str().to_owned(),
     })
 }
 

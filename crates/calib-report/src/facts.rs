@@ -50,6 +50,8 @@ pub struct MissingPhysics {
     pub physics: Physics,
     /// Name of its parameter, for instance `elbow.compliance`.
     pub parameter: String,
+    /// Its value that one step towards the better model gives, in the unit of the parameter.
+    pub estimate: f64,
     /// Share of χ² that it would remove.
     pub explains: f64,
     /// Probability of such residuals if it were absent.

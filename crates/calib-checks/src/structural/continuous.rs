@@ -1,7 +1,7 @@
-//! Continuous faults (gain, coupling by a fraction, readings that lag behind) by score tests, and the residual that nominal errors explain.
+//! Continuous faults (gain, coupling by a fraction, readings that lag behind, of a recording or of a joint) by score tests, and the residual that nominal errors explain.
 //!
 //! The residuals `r = Q y + c − R m − t` are linear in small changes of the registration (Q, c, m: columns A_r), of the nominal
-//! geometry (six per moving joint, with priors: A_g) and of the tested parameter (one column G per gain, per coupling and per recording's lag):
+//! geometry (six per moving joint, with priors: A_g) and of the tested parameter (one column G per gain, per coupling, per recording's lag and per joint's latency):
 //!
 //! ```text
 //! r ≈ A x + G k + e,   cov e = σ² (I + λ Σ_j D_j D_jᵀ) per row,   D_j = ∂(R m + t)/∂reading_j         joint noise
@@ -24,7 +24,7 @@ use super::apply::apply_all;
 use super::candidates::span;
 use super::data::Data;
 use super::hypothesis::{Hypothesis, Scope, Scoped};
-use super::ids::{RecordingIndex, SampleIndex};
+use super::ids::{JointIndex, RecordingIndex, SampleIndex};
 use super::linear::{Map, Model, Sums, projected, solve};
 use super::nonlinear::{fewer, noise_ratio, relinearized};
 use super::screen::{Screened, screen};
@@ -42,9 +42,9 @@ const AS_GOOD: f64 = 6.0;
 /// A continuous fault that the data demand.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Continuous {
-    /// [`Hypothesis::Gain`], [`Hypothesis::Coupling`] or [`Hypothesis::Lag`], with its estimated factor or lag.
+    /// [`Hypothesis::Gain`], [`Hypothesis::Coupling`], [`Hypothesis::Lag`] or [`Hypothesis::Latency`], with its estimated factor or time.
     pub hypothesis: Hypothesis,
-    /// Standard deviation of the factor, or of the lag, s.
+    /// Standard deviation of the factor, or of the time, s.
     pub sigma: f64,
     /// The score statistic.
     pub statistic: f64,
@@ -72,6 +72,7 @@ impl Test {
                 recording,
                 seconds: k,
             },
+            Self::Latency { joint } => Hypothesis::Latency { joint, seconds: k },
         }
     }
 }
@@ -104,8 +105,10 @@ pub(crate) fn continuous(
 /// Whether two are the same fault, of whatever size.
 fn same(a: &Hypothesis, b: &Hypothesis) -> bool {
     let of = |h: &Hypothesis| match *h {
-        Hypothesis::Gain { joint, .. } => Some((joint.0, joint.0)),
-        Hypothesis::Coupling { joint, source, .. } => Some((joint.0, source.0)),
+        Hypothesis::Gain { joint, .. } => Some((0, joint.0, joint.0)),
+        Hypothesis::Coupling { joint, source, .. } => Some((0, joint.0, source.0)),
+        Hypothesis::Lag { recording, .. } => Some((1, recording.0, 0)),
+        Hypothesis::Latency { joint, .. } => Some((2, joint.0, 0)),
         _ => None,
     };
     of(a) == of(b)
@@ -181,6 +184,7 @@ fn demanded(data: &Data, screened: &[SampleIndex], options: &Options) -> Option<
     let map = solve(&model, &sums, sigma, &deviation, options)?;
     let mut scored = score_tests(&model, &sums, &map);
     scored.sort_by(|a, b| b.1.total_cmp(&a.1));
+    whole_recording_first(&tests, &mut scored);
     let &(which, statistic, factor, h) = scored.first()?;
     if map.freedom < LEAST_FREEDOM {
         return None;
@@ -196,7 +200,8 @@ fn demanded(data: &Data, screened: &[SampleIndex], options: &Options) -> Option<
     if effect < options.least_effect {
         return None;
     }
-    let alternatives = scored[1..].iter().take_while(|s| statistic - s.1 < AS_GOOD);
+    let as_good = |s: &&(usize, f64, f64, f64)| statistic - s.1 < AS_GOOD;
+    let alternatives = scored[1..].iter().take_while(as_good);
     Some(Continuous {
         hypothesis: tests[which].hypothesis(factor),
         sigma: map.sigma / h.sqrt(),
@@ -205,6 +210,21 @@ fn demanded(data: &Data, screened: &[SampleIndex], options: &Options) -> Option<
         effect,
         alternatives: alternatives.map(|s| tests[s.0].hypothesis(s.2)).collect(),
     })
+}
+
+/// Of a joint that is late and a recording that is late as a whole, the second is more common: the first must explain more.
+fn whole_recording_first(tests: &[Test], scored: &mut [(usize, f64, f64, f64)]) {
+    let best = scored.first().map(|s| (tests[s.0], s.1));
+    let Some((Test::Latency { .. }, statistic)) = best else {
+        return;
+    };
+    let as_good = scored.iter().take_while(|s| statistic - s.1 < AS_GOOD);
+    let of_recording = as_good
+        .map(|s| tests[s.0])
+        .position(|test| matches!(test, Test::Lag { .. }));
+    if let Some(place) = of_recording {
+        scored[..=place].rotate_right(1);
+    }
 }
 
 fn tests(data: &Data) -> Vec<Test> {
@@ -219,7 +239,16 @@ fn tests(data: &Data) -> Vec<Test> {
     let timed: BTreeSet<RecordingIndex> = known
         .filter_map(|(recording, rates)| rates.as_ref().map(|_| *recording))
         .collect();
+    let moves = |joint: &JointIndex| {
+        let mut rates = data.rates.iter().flatten();
+        rates.any(|of_row| of_row.get(joint.0).is_some_and(|rate| *rate != 0.0))
+    };
+    let moving: Vec<JointIndex> = joints.into_iter().filter(moves).collect();
     tests.extend(timed.into_iter().map(|recording| Test::Lag { recording }));
+    // Of one joint that moves it is the lag of the recording.
+    if moving.len() > 1 {
+        tests.extend(moving.into_iter().map(|joint| Test::Latency { joint }));
+    }
     tests
 }
 

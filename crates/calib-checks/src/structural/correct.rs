@@ -25,7 +25,13 @@ pub(crate) fn correct(scoped: &Scoped, data: &Data) -> Data {
         }
         Hypothesis::Remounted { body } => remount(&mut corrected, scoped.scope, body),
         Hypothesis::TrackerMoved | Hypothesis::MissingColumn { .. } => {}
-        Hypothesis::Lag { recording, seconds } => later(&mut corrected, recording, seconds),
+        Hypothesis::Lag { recording, seconds } => {
+            later(&mut corrected, seconds, |of, _| of == recording);
+        }
+        Hypothesis::Latency { joint, seconds } => {
+            let inside = |of, j| scoped.scope.contains(of) && j == joint;
+            later(&mut corrected, seconds, inside);
+        }
         Hypothesis::StoodAt { joint, value } => {
             // Where every row has a reading, it is the readings that are wrong.
             let empty = empty_rows(scoped.scope, joint, data);
@@ -83,14 +89,15 @@ fn correct_readings(data: &mut Data, h: &Hypothesis, inside: &[bool]) {
     }
 }
 
-/// Every reading as it was `seconds` later.
-fn later(data: &mut Data, recording: RecordingIndex, seconds: f64) {
+/// Readings of the recordings and joints that are meant, as they were `seconds` later.
+fn later(data: &mut Data, seconds: f64, meant: impl Fn(RecordingIndex, JointIndex) -> bool) {
     let rows = data.readings.iter_mut().zip(&data.rates);
     for ((row, rates), of) in rows.zip(&data.recording) {
-        if *of == recording
-            && let Some(rates) = rates
-        {
-            for (q, rate) in row.iter_mut().zip(rates) {
+        let Some(rates) = rates else {
+            continue;
+        };
+        for (j, (q, rate)) in row.iter_mut().zip(rates).enumerate() {
+            if meant(*of, JointIndex(j)) {
                 *q = q.map(|q| q + rate * seconds);
             }
         }

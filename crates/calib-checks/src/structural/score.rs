@@ -36,11 +36,15 @@ pub(crate) fn score(scan: &Scan<'_>, candidates: &[Candidate], enough: f64) -> V
     scored.into_iter().flatten().collect()
 }
 
-/// A joint whose estimated readings lie within this of their median, rad or m, may have stood still: nominal errors move them
-/// by a few degrees.
-const STILL: f64 = 0.25;
+/// A joint whose estimated readings lie within this of their median, rad or m, may have stood still: nominal errors move those of joints that turn by a
+/// few degrees, of joints that slide by a few centimeters.
+fn still(turns: bool) -> f64 {
+    if turns { 0.25 } else { 0.03 }
+}
 /// A joint that stood still within this of 0, rad or m, is where it was assumed to be.
-const AT_ZERO: f64 = 0.05;
+fn at_zero(turns: bool) -> f64 {
+    if turns { 0.05 } else { 0.02 }
+}
 /// One place for all rows is the explanation unless a reading per row explains this many times as much.
 const SIMPLER: f64 = 1.2;
 
@@ -74,8 +78,9 @@ fn empty_column(scan: &Scan<'_>, scoped: Scoped, joint: JointIndex, filled: &Dat
         return Scored { scoped, score };
     };
     let (stood, value) = stood_at(scan, scoped, joint, found.middle);
-    let still = found.spread < STILL;
-    if value.abs() > AT_ZERO && (still || stood.score.score < SIMPLER * score.score) {
+    let turns = scan.data.chain.turns(joint.0) != Some(false);
+    let still = found.spread < still(turns);
+    if value.abs() > at_zero(turns) && (still || stood.score.score < SIMPLER * score.score) {
         return stood;
     }
     if still {
@@ -89,7 +94,8 @@ fn empty_column(scan: &Scan<'_>, scoped: Scoped, joint: JointIndex, filled: &Dat
 fn stood_elsewhere(scan: &Scan<'_>, scoped: Scoped, joint: JointIndex) -> Scored {
     let (mut stood, value) = stood_at(scan, scoped, joint, 0.0);
     let read = scan.data.readings.first().and_then(|row| row[joint.0]);
-    if read.is_none_or(|read| (value - read).abs() < AT_ZERO) {
+    let turns = scan.data.chain.turns(joint.0) != Some(false);
+    if read.is_none_or(|read| (value - read).abs() < at_zero(turns)) {
         stood.score.score = f64::INFINITY;
     }
     stood.score.score *= OWN_FRAME;

@@ -17,7 +17,7 @@ const ALTERNATIONS: usize = 12;
 const SETTLED: f64 = 1e-3;
 /// Starts per row for an empty column: 30° apart, less than half the width of a basin.
 const STARTS: usize = 12;
-/// Half the stroke (m) that is searched for an empty column of a prismatic joint.
+/// Half the stroke (m) in which the one place of a prismatic joint is looked for.
 const STROKE: f64 = 0.6;
 
 /// [`apply`](super::apply) for the hypotheses of this file.
@@ -292,6 +292,13 @@ fn best_reading(
         }
         sum
     };
+    if scan.data.chain.turns(joint.0) == Some(false) {
+        // The cost of a motion along a line is a parabola.
+        let [before, at, after] = [-STROKE, 0.0, STROKE].map(&mut cost);
+        let curvature = before + after - 2.0 * at;
+        let least = STROKE * 0.5 * (before - after) / curvature;
+        return if least.is_finite() { least } else { 0.0 };
+    }
     let step = 2.0 * range / STARTS as f64;
     let mut best = (cost(0.0), 0.0);
     for s in 0..STARTS {
@@ -301,7 +308,7 @@ fn best_reading(
             best = (f, q);
         }
     }
-    // Golden-section search around the best start: the cost of one row has one minimum there.
+    // Of a joint that turns: golden-section search around the best start: the cost of one row has one minimum there.
     let (mut low, mut high) = (best.1 - step, best.1 + step);
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
     for _ in 0..36 {

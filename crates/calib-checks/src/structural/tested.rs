@@ -1,7 +1,7 @@
 //! Columns of the score tests: each is a reading times the derivative by a reading, so none is ever written out.
 //!
 //! ```text
-//! G_js = −q_s D_j  of a gain or coupling,   G = −Σ_j q̇_j D_j  of a lag                                (1)
+//! G_js = −q_s D_j  of a gain or coupling,   G = −Σ_j q̇_j D_j  of a lag, −q̇_j D_j of a latency         (1)
 //! Dᵀ V⁻¹ A = (1 + λ DᵀD)⁻¹ Dᵀ A,            V = 1 + λ D Dᵀ                                            (2)
 //! ```
 //!
@@ -22,6 +22,8 @@ pub(crate) enum Test {
     },
     /// Every reading of the recording as it was k seconds later.
     Lag { recording: RecordingIndex },
+    /// The joint's readings as they were k seconds later.
+    Latency { joint: JointIndex },
 }
 
 /// What the columns of an instant's tests depend on.
@@ -57,19 +59,19 @@ impl<'a> TestedSums<'a> {
         if self.tests.is_empty() {
             return;
         }
-        let Some((with_block, with_itself)) = noise.whitened(self.lambda) else {
+        let Some(whitened) = noise.whitened(self.lambda) else {
             return;
         };
+        let (with_block, with_itself) = &whitened;
         for (t, test) in self.tests.iter().enumerate() {
             match test {
                 Test::Reading { joint, source } => {
-                    let by = -instant.readings[source.0];
-                    let Some(j) = noise.place(joint.0).filter(|_| by != 0.0) else {
-                        continue;
-                    };
-                    let column = with_block.column(j);
-                    self.cross.column_mut(t).axpy(by, &column, 1.0);
-                    self.own[t] += by * by * with_itself[(j, j)];
+                    self.add_joint(t, *joint, -instant.readings[source.0], noise, &whitened);
+                }
+                Test::Latency { joint } => {
+                    let rate = instant.rates.and_then(|rates| rates.get(joint.0));
+                    let by = -rate.copied().unwrap_or(0.0);
+                    self.add_joint(t, *joint, by, noise, &whitened);
                 }
                 Test::Lag { recording } if instant.recording == *recording => {
                     let Some(rates) = instant.rates else {
@@ -79,12 +81,28 @@ impl<'a> TestedSums<'a> {
                         .joints()
                         .map(|j| -rates.get(j).copied().unwrap_or(0.0));
                     let rates = DVector::from_iterator(with_itself.nrows(), rates);
-                    let column = &with_block * &rates;
+                    let column = with_block * &rates;
                     self.cross.column_mut(t).axpy(1.0, &column, 1.0);
-                    self.own[t] += rates.dot(&(&with_itself * &rates));
+                    self.own[t] += rates.dot(&(with_itself * &rates));
                 }
                 Test::Lag { .. } => {}
             }
+        }
+    }
+
+    /// Adds the column of test `t`: `by` times the derivative by the joint's reading.
+    fn add_joint(
+        &mut self,
+        t: usize,
+        joint: JointIndex,
+        by: f64,
+        noise: &JointNoise,
+        (with_block, with_itself): &(DMatrix<f64>, DMatrix<f64>),
+    ) {
+        if let Some(j) = noise.place(joint.0).filter(|_| by != 0.0) {
+            let column = with_block.column(j);
+            self.cross.column_mut(t).axpy(by, &column, 1.0);
+            self.own[t] += by * by * with_itself[(j, j)];
         }
     }
 }
@@ -104,6 +122,9 @@ mod tests {
             .collect();
         let recordings = [RecordingIndex(0), RecordingIndex(1)];
         tests.extend(recordings.map(|recording| Test::Lag { recording }));
+        tests.extend((0..joints).map(|j| Test::Latency {
+            joint: JointIndex(j),
+        }));
         for (rows, lambda, weight) in [(3, 0.7, 1.0), (12, 0.7, 0.06), (6, 0.0, 1.0)] {
             let mut sums = TestedSums::new(lambda, width, &tests);
             let mut expected = DMatrix::<f64>::zeros(width, tests.len());
@@ -128,7 +149,8 @@ mod tests {
                         Test::Lag { recording } if recording.0 == n % 2 && n != 4 => {
                             &d * -DVector::from_column_slice(&rates)
                         }
-                        Test::Lag { .. } => DVector::zeros(rows),
+                        Test::Latency { joint } if n != 4 => d.column(joint.0) * -rates[joint.0],
+                        Test::Lag { .. } | Test::Latency { .. } => DVector::zeros(rows),
                     };
                     let whitened = &inverse * &column;
                     expected.column_mut(t).gemv_tr(1.0, &block, &whitened, 1.0);

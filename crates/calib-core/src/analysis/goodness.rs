@@ -396,7 +396,7 @@ fn candidates(model: &Model) -> Vec<Candidate> {
             }
         }
         for candidate in &joint.candidates {
-            if candidate.kind.term().source == Source::Velocity {
+            if candidate.kind == EffectKind::ClockOffset {
                 let clock = clocks.entry(&candidate.name).or_default();
                 clock.push((e, Drives::About, candidate.values.clone()));
             } else {

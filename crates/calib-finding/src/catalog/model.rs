@@ -105,6 +105,12 @@ super::topic! {
         "ahead": Warning,
             "The joint values of {recording:code} are {offset} ± {sigma} ahead of the tracker's data of their rows: that changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
             "Let the fit estimate it: `timing: {poses: continuous, clock: estimate}` in {recording:code} and in the recordings made in the same way. Or record in holds.";
+        "joint_behind": Warning,
+            "The values of joint `{joint}` in {recordings:code} lag {offset} ± {sigma} behind those of the other joints and the tracker's data of their rows: that changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
+            "Write the values of this joint into the log at the time at which they were measured. Or let them be moved, in {recordings:code} and in the recordings made in the same way: `timing: {poses: continuous, late_ms: {{joint}: {late:yaml-ms}}}`. Or record in holds.";
+        "joint_ahead": Warning,
+            "The values of joint `{joint}` in {recordings:code} are {offset} ± {sigma} ahead of those of the other joints and of the tracker's data of their rows: that changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
+            "Write the values of this joint into the log at the time at which they were measured. Or let them be moved, in {recordings:code} and in the recordings made in the same way: `timing: {poses: continuous, late_ms: {{joint}: {late:yaml-ms}}}`. Or record in holds.";
         "corrected_behind": Warning,
             "The joint values of {recording:code} lag {offset} ± {sigma} behind the tracker's data of their rows. This was estimated from the motion and corrected.",
             "Correct the times of the joint values if you can. The offset is taken into account.";

@@ -24,6 +24,7 @@ pub mod eccentricity_2;
 pub mod flank_backlash;
 pub mod friction;
 pub mod gain;
+pub mod latency;
 pub mod lateral_compliance;
 pub mod motor_eccentricity;
 pub mod motor_eccentricity_2;
@@ -54,6 +55,7 @@ pub static EFFECTS: &[&Effect] = &[
     &coupling::EFFECT,
     &thermal_expansion::EFFECT,
     &clock_offset::EFFECT,
+    &latency::EFFECT,
     &other::EFFECT,
 ];
 
@@ -104,6 +106,8 @@ pub enum EffectKind {
     ThermalExpansion,
     /// F = joint velocity, rad/s (m/s); the coefficient is a time.
     ClockOffset,
+    /// F = joint velocity, rad/s (m/s), of one joint; the coefficient is a time.
+    Latency,
     /// F = whatever the caller supplies.
     Other,
     /// F of a plugin; a file of ours names it by its plugin, never so.

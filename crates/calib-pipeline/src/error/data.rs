@@ -54,6 +54,12 @@ pub enum DataProblem {
         /// The joint.
         joint: String,
     },
+    /// Values that are called late and are not there.
+    #[error("joint `{joint}` is called late, and the recording does not have it")]
+    LateJointNotRecorded {
+        /// The joint.
+        joint: String,
+    },
     /// A column without a value.
     #[error("joint `{joint}` has a column, and no value in any row")]
     NoJointValues {
@@ -217,6 +223,7 @@ impl DataProblem {
             Self::StreamNotAJoint { .. } => "rename it, or map it under `columns`",
             Self::JointUnit { .. } => "correct the unit in the column name",
             Self::HeldAndRecorded { .. } => "remove it from `hold`",
+            Self::LateJointNotRecorded { .. } => "remove it from `timing: {late_ms}`",
             Self::NoJointValues { .. } => {
                 "export its values; where it stood still, remove the column and say where: `hold` in the recording"
             }

@@ -9,6 +9,8 @@
 //!
 //! so one c₀ and one c₁ are shared by all joints of a recording ([`calib_core::EffectKind::ClockOffset`]).
 
+use std::collections::BTreeSet;
+
 use calib_checks::sync::ClockMap;
 use calib_core::{EffectKind, Parameter, ParameterId, ParameterKind, Problem, Unit};
 use calib_finding::{About, Fact, Finding, Subject, catalog};
@@ -95,6 +97,36 @@ pub fn add_clocks(formulation: &mut Formulation, inputs: &Inputs, free_set: Free
                 problem.share_effect(edge, EffectKind::ClockOffset, Some(linear), drift);
             }
         }
+    }
+    add_latencies(formulation, inputs);
+}
+
+/// Offers the latency of every joint to the test for missing physics; where one joint alone moves it is the offset of the clock.
+fn add_latencies(formulation: &mut Formulation, inputs: &Inputs) {
+    let timed = |name: &str| inputs.recordings.get(name).map(|loaded| &loaded.velocities);
+    let moves = |speed: &Option<f64>| speed.is_some_and(|speed| speed != 0.0);
+    let fitted = || {
+        let all = inputs.recordings.values();
+        all.filter(|loaded| loaded.spec.usage != Usage::Validation)
+    };
+    let moving: BTreeSet<&String> = fitted()
+        .flat_map(|loaded| &loaded.velocities)
+        .filter(|(_, speeds)| speeds.iter().any(moves))
+        .map(|(joint, _)| joint)
+        .collect();
+    for joint in moving.iter().filter(|_| moving.len() > 1) {
+        let id = inputs.robot.model.joint_id(joint).ok();
+        let Some(edge) = id.and_then(|id| formulation.joints[id.index()]) else {
+            continue;
+        };
+        let speed = |(recording, row): &(String, usize)| -> f64 {
+            let speeds = timed(recording).and_then(|of| of.get(*joint));
+            let speed = speeds.and_then(|speeds| speeds.get(*row).copied().flatten());
+            speed.unwrap_or(0.0)
+        };
+        let speeds: Vec<f64> = formulation.samples.iter().map(speed).collect();
+        let problem = &mut formulation.problem;
+        problem.candidate(edge, EffectKind::Latency, speeds);
     }
 }
 

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use calib_core::RejectReason;
-use calib_core::effect::clock_offset;
+use calib_core::effect::{Effect, clock_offset, latency};
 use calib_finding::{About, Fact, Finding, catalog};
 use calib_profile::{Method, Usage};
 use calib_report::{
@@ -188,18 +188,29 @@ pub(crate) fn findings(
     findings
 }
 
-/// Physics that the residuals show; a clock is not freed as an effect is.
+/// Physics that the residuals show; neither a clock nor late readings are freed as an effect is.
 pub(crate) fn missing_finding(e: &Evidence<'_>, missing: &MissingPhysics) -> Finding {
-    let clock = clock_offset::EFFECT.terms.iter().find_map(|term| {
-        let name = missing.parameter.strip_suffix(term.name)?;
-        let recording = name.strip_suffix('.')?;
-        let known = e.inputs.recordings.contains_key(recording);
-        known.then_some(recording)
-    });
-    let finding = match clock {
-        Some(recording) => Finding::of_kind(catalog::MISSING_PHYSICS, "clock", About::Fit)
-            .with("recording", Fact::name(recording)),
-        None => Finding::of_kind(catalog::MISSING_PHYSICS, "effect", About::Fit),
+    let of = |effect: &'static Effect| {
+        effect.terms.iter().find_map(|term| {
+            let name = missing.parameter.strip_suffix(term.name)?;
+            name.strip_suffix('.')
+        })
+    };
+    let recordings = &e.inputs.recordings;
+    let clock = of(&clock_offset::EFFECT).filter(|name| recordings.contains_key(*name));
+    let joints = &e.inputs.robot.model;
+    let late = of(&latency::EFFECT).filter(|name| joints.joint_id(name).is_ok());
+    let kind = |kind| Finding::of_kind(catalog::MISSING_PHYSICS, kind, About::Fit);
+    let finding = match (clock, late) {
+        (Some(recording), _) => kind("clock").with("recording", Fact::name(recording)),
+        (None, Some(joint)) => {
+            let timed = recordings.values().filter(|r| !r.velocities.is_empty());
+            kind("latency")
+                .with("joint", Fact::name(joint))
+                .with("late", Fact::seconds(missing.estimate))
+                .with("recordings", Fact::names(timed.map(|r| r.name.as_str())))
+        }
+        (None, None) => kind("effect"),
     };
     let alike = e.causes.alike.iter();
     let alike = alike.filter(|(name, _)| *name == missing.parameter);

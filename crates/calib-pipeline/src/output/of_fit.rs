@@ -309,6 +309,7 @@ pub(crate) fn missing_physics(test: &calib_core::ScoreTest) -> calib_report::Mis
             _ => calib_report::Physics::Drift,
         },
         parameter: test.name.clone(),
+        estimate: test.estimate,
         explains: test.explains,
         p_value: test.p_corrected,
     }

@@ -71,7 +71,14 @@ fn aligned(
     timing: &Timing,
     recording: &Recording,
 ) -> Result<Aligned, DataProblem> {
-    let streams = Streams::of(recording)?;
+    let mut streams = Streams::of(recording)?;
+    for (joint, late) in &timing.late {
+        let joint = robot.model.joint(*joint).name.clone();
+        match streams.joints.get_mut(&joint) {
+            Some(stream) => stream.was_late(*late),
+            None => return Err(DataProblem::LateJointNotRecorded { joint }),
+        }
+    }
     let joints = streams.joints.iter();
     blanks::none_is_empty(joints.map(|(joint, stream)| (joint, stream.values.as_slice())))?;
     let mut full =

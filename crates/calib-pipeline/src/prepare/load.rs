@@ -58,7 +58,8 @@ pub fn load_recordings_with(
         });
         let shown = path.display().to_string();
         let texts = texts(&robot.profile, name, spec);
-        let mut recording = read(spec, &texts, &shown, &bytes, &estimators)?;
+        let known = known(&robot, false);
+        let mut recording = read(spec, (&texts, known), &shown, &bytes, &estimators)?;
         if let Some(log) = &spec.robot_log {
             let of_robot = read_robot_log(&robot, name, spec, log, &estimators, &mut digests)?;
             recording = match &spec.timing {
@@ -139,7 +140,7 @@ fn read_robot_log(
         columns: log.columns.clone(),
         ..spec.clone()
     };
-    let recording = read(&own, &[], &shown, &bytes, estimators)?;
+    let recording = read(&own, (&[], known(robot, true)), &shown, &bytes, estimators)?;
     if recording.joints.is_empty() {
         return Err(PipelineError::data(shown, DataProblem::NoJointsInLog));
     }
@@ -216,7 +217,7 @@ pub fn of_tables(
 /// border.
 fn read(
     spec: &RecordingSpec,
-    texts: &[&String],
+    (texts, known): (&[&String], ReadOptions),
     shown: &str,
     bytes: &[u8],
     estimators: &Estimators,
@@ -236,11 +237,24 @@ fn read(
         let options = ReadOptions {
             format: spec.reader.clone(),
             columns: column_map(spec, texts),
-            ..ReadOptions::default()
+            ..known
         };
         return Ok(calib_recording::read_bytes(shown, bytes, &options)?);
     };
     readers::read(entry, &values(&spec.reader_parameters), shown, bytes)
+}
+
+/// What is known of a table before it is read; `of_robot`: it is the robot's own log.
+fn known(robot: &RobotProfile, of_robot: bool) -> ReadOptions {
+    let joints = robot.model.joints().iter();
+    ReadOptions {
+        joints: joints
+            .filter(|joint| joint.kind.axis().is_some())
+            .map(|joint| joint.name.clone())
+            .collect(),
+        of_robot,
+        ..ReadOptions::default()
+    }
 }
 
 /// Text columns that the profile needs of a recording: its groups, and the names of touched spots.

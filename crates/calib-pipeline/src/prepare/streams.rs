@@ -67,6 +67,11 @@ impl Scalars {
         recording.joints.iter().map(stream).collect()
     }
 
+    /// Puts values that are `late`, s, to the times to which they belong.
+    pub(crate) fn was_late(&mut self, late: f64) {
+        self.t.iter_mut().for_each(|t| *t -= late);
+    }
+
     /// All torques of a recording.
     #[must_use]
     pub fn of_torques(recording: &Recording) -> BTreeMap<String, Self> {

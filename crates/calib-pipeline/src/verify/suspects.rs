@@ -27,7 +27,10 @@ pub(super) fn suspected_before<'a>(
     };
     match finding.id {
         id if id == catalog::JOINT_GAIN => tested(format!("{}.gain", word("joint")?)),
-        id if id == catalog::CLOCK_LAG => tested(format!("{}.clock_offset", word("recording")?)),
+        id if id == catalog::CLOCK_LAG => tested(match word("joint") {
+            Some(joint) => format!("{joint}.latency"),
+            None => format!("{}.clock_offset", word("recording")?),
+        }),
         id if id == catalog::JOINT_COUPLING => {
             let model = &inputs.robot.model;
             let (joint, other) = (word("joint")?, word("other")?);

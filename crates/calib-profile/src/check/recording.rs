@@ -82,7 +82,18 @@ impl Checker<'_> {
         ] {
             self.above_zero(&["recordings", name, "timing", key], value);
         }
+        let mut late = BTreeMap::new();
+        for (joint, ms) in &raw.late_ms {
+            let path = ["recordings", name, "timing", "late_ms", joint];
+            if !ms.is_finite() {
+                self.problem(&path, format!("{ms} is not a time"), "give ms, e.g. 30");
+            }
+            if let Some(joint) = self.joint(&path, joint) {
+                late.insert(joint, ms * 1e-3);
+            }
+        }
         Timing {
+            late,
             poses: raw.poses,
             clock: raw.clock,
             hold: raw.hold_s,

@@ -42,7 +42,7 @@ pub struct RobotLog {
 }
 
 /// Time in a recording.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Timing {
     /// Where the poses come from.
     pub poses: TimedPoses,
@@ -54,4 +54,6 @@ pub struct Timing {
     pub rate: f64,
     /// Largest offset between the clocks, s.
     pub max_offset: f64,
+    /// By how much the values of a joint are later than those of the others, s.
+    pub late: BTreeMap<JointId, f64>,
 }

@@ -114,6 +114,9 @@ pub struct RawTiming {
     pub rate_hz: f64,
     /// Largest offset between the clocks that is looked for, s.
     pub max_offset_s: f64,
+    /// By how much the values of a joint are later than those of the others, ms, where its log was filtered or sent separately: `{elbow: 30}`; below 0
+    /// where they are ahead.
+    pub late_ms: BTreeMap<String, f64>,
 }
 
 impl Default for RawTiming {
@@ -124,6 +127,7 @@ impl Default for RawTiming {
             hold_s: 0.5,
             rate_hz: 10.0,
             max_offset_s: 10.0,
+            late_ms: BTreeMap::new(),
         }
     }
 }

@@ -3,7 +3,7 @@
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
 use crate::model::Recording;
-use crate::table::{is_canonical, read_table};
+use crate::table::{Known, is_canonical, read_table};
 use crate::text::{Separator, cells};
 use calib_finding::nearest_word;
 use std::io::BufReader;
@@ -104,7 +104,12 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
             )
         })?),
     };
-    let mut recording = read_table(BufReader::with_capacity(1 << 16, input), map.as_ref())?;
+    let known = Known {
+        joints: &options.joints,
+        of_robot: options.of_robot,
+    };
+    let input = BufReader::with_capacity(1 << 16, input);
+    let mut recording = read_table(input, map.as_ref(), known)?;
     if options
         .columns
         .as_ref()

@@ -35,6 +35,10 @@ pub struct ReadOptions {
     pub up_axis: Option<String>,
     /// What three rotation columns mean, where a file leaves it open (Vicon objects).
     pub rotation: Option<RotationForm>,
+    /// Names of the robot's joints, where they are known: columns of a table that read as coordinates by their names alone (`x_mm` of a gantry) are theirs.
+    pub joints: Vec<String>,
+    /// The robot's own log: a table of three coordinates without a name is one of joints of these names, and of no marker.
+    pub of_robot: bool,
     /// Files above this size are refused, bytes.
     pub max_bytes: u64,
 }
@@ -47,6 +51,8 @@ impl Default for ReadOptions {
             columns: None,
             up_axis: None,
             rotation: None,
+            joints: Vec::new(),
+            of_robot: false,
             max_bytes: 8 << 30,
         }
     }

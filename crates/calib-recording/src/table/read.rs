@@ -1,6 +1,6 @@
 //! A table from its first line to its last, in one pass.
 
-use super::header::Layout;
+use super::header::{Known, Layout};
 use super::rows::Rows;
 use crate::column_map::{ColumnMap, Delimiter};
 use crate::error::{At, Placed, Problem};
@@ -14,10 +14,14 @@ use std::io::BufRead;
 pub const WRITTEN_LIVE: &str = "written live: a last line without line break was cut off";
 
 /// Reads a wide or long table. `map` must be resolved (no preset left).
-pub(crate) fn read_table(input: impl BufRead, map: Option<&ColumnMap>) -> Placed<Recording> {
+pub(crate) fn read_table(
+    input: impl BufRead,
+    map: Option<&ColumnMap>,
+    known: Known<'_>,
+) -> Placed<Recording> {
     let mut lines = Lines::new(input);
     let mut comments = Vec::new();
-    let (layout, separator) = match read_header(&mut lines, map, &mut comments)? {
+    let (layout, separator) = match read_header(&mut lines, (map, known), &mut comments)? {
         Some(found) => found,
         None if lines.number() == 0 => return Err((At::File, Problem::Empty)),
         None => return Err((At::Line(lines.number()), Problem::NoRows)),
@@ -54,7 +58,7 @@ pub(crate) fn read_table(input: impl BufRead, map: Option<&ColumnMap>) -> Placed
 /// Layout and separator; `None` when the file ends before its header.
 fn read_header<R: BufRead>(
     lines: &mut Lines<R>,
-    map: Option<&ColumnMap>,
+    (map, known): (Option<&ColumnMap>, Known<'_>),
     comments: &mut Vec<String>,
 ) -> Placed<Option<(Layout, Separator)>> {
     let given = map
@@ -75,7 +79,7 @@ fn read_header<R: BufRead>(
     {
         let separator = given.unwrap_or(Separator::Byte(b','));
         return Ok(Some((
-            Layout::new(lines.number(), map.names.clone(), Some(map))?,
+            Layout::new(lines.number(), map.names.clone(), (Some(map), known))?,
             separator,
         )));
     }
@@ -92,7 +96,7 @@ fn read_header<R: BufRead>(
         } else if !line.trim().is_empty() {
             let separator = given.unwrap_or_else(|| Separator::guess(line));
             let names = cells(line, separator).map(unquoted).collect();
-            return Ok(Some((Layout::new(number, names, map)?, separator)));
+            return Ok(Some((Layout::new(number, names, (map, known))?, separator)));
         }
     }
 }

@@ -1,6 +1,6 @@
 //! The canonical table, always the same bytes for the same poses.
 
-use super::header::{JOINT, Layout, reads_as_joint};
+use super::header::{JOINT, Known, Layout, reads_as_joint};
 use crate::column_map::ColumnMap;
 use crate::model::{self, JointUnit, MarkerSample, Recording, Timeline, WHOLE_ROBOT};
 use crate::poses::{NotOneTable, Poses};
@@ -343,7 +343,7 @@ fn misread(poses: &Poses, header: &[String]) -> Option<String> {
         labels: poses.labels.keys().cloned().collect(),
         ..ColumnMap::default()
     };
-    let layout = match Layout::new(1, names, Some(&map)) {
+    let layout = match Layout::new(1, names, (Some(&map), Known::default())) {
         Ok(layout) => layout,
         Err((_, problem)) => return Some(problem.to_string()),
     };

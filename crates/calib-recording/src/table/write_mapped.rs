@@ -9,7 +9,7 @@ use std::fmt::Write;
 
 use nalgebra::{Isometry3, Point3};
 
-use super::header::{Column, Layout, Rotation};
+use super::header::{Column, Known, Layout, Rotation};
 use super::write::{NotWritten, WriteOptions, columns, push_number, state_joints};
 use crate::column_map::{ColumnMap, Delimiter};
 use crate::model::Filled;
@@ -38,7 +38,7 @@ pub fn write_mapped(
         true => header(poses, &map, options),
         false => map.names.clone(),
     };
-    let layout = Layout::new(1, names.clone(), Some(&map));
+    let layout = Layout::new(1, names.clone(), (Some(&map), Known::default()));
     let layout = layout.map_err(|(_, problem)| refused(problem.to_string()))?;
     let separator = separator(&map).ok_or_else(|| {
         let why = "with `decimal_comma` a comma cannot separate the cells: give it `delimiter: semicolon`";

@@ -594,3 +594,50 @@ fn a_label_of_any_name_is_written_and_read_when_named() {
         .expect("one table");
     assert_eq!(back.labels["torso"], ["1: up"]);
 }
+
+/// Joints that are called like coordinates are joints where the robot is known.
+#[test]
+fn columns_of_the_robot_s_joints_are_no_markers() {
+    let read = |header: &str, joints: &[&str], of_robot: bool| {
+        let cells = header.split(',').count();
+        let text = format!("{header}\n{}\n", vec!["1"; cells].join(","));
+        let options = ReadOptions {
+            joints: joints.iter().map(|&j| j.to_owned()).collect(),
+            of_robot,
+            ..ReadOptions::default()
+        };
+        let recording = read_bytes("t.csv", text.as_bytes(), &options).expect("a table");
+        let joints: Vec<String> = recording.joints.iter().map(|j| j.name.clone()).collect();
+        let markers = recording.markers.iter().map(|m| m.name.clone());
+        (joints.join(" "), markers.collect::<Vec<_>>().join(" "))
+    };
+    let said = |joints: &str, markers: &str| (joints.to_owned(), markers.to_owned());
+    let gantry = ["x", "y", "z"];
+    let tracked = "x_mm,y_mm,z_mm,h_1.x_m,h_1.y_m,h_1.z_m";
+    assert_eq!(read(tracked, &gantry, false), said("x y z", "h_1"));
+    assert_eq!(read(tracked, &[], false), said("", "marker h_1"));
+    // A joint that was forgotten.
+    let without = "y_mm,z_mm,h_1.x_m,h_1.y_m,h_1.z_m";
+    assert_eq!(read(without, &gantry, false), said("y z", "h_1"));
+    // A marker beside joints `x` and `y` alone; of three coordinates a joint is none.
+    assert_eq!(read(tracked, &["x", "y"], false), said("", "marker h_1"));
+    assert_eq!(
+        read("x_mm,y_mm,z_mm,a_deg", &gantry, false),
+        said("a", "marker")
+    );
+    assert_eq!(
+        read("x_mm,y_mm,z_mm,a_deg", &gantry, true),
+        said("x y z a", "")
+    );
+    // Names with an ending.
+    let base = "base_x_m,base_y_m,base_z_m,h_1.x_m,h_1.y_m,h_1.z_m";
+    let joints = ["base_x", "base_y", "base_z"];
+    assert_eq!(
+        read(base, &joints, false),
+        said("base_x base_y base_z", "h_1")
+    );
+    assert_eq!(read(base, &joints[..2], false), said("", "base h_1"));
+    // In a long table they are the coordinates of what the row names.
+    let long = "x_mm,y_mm,z_mm,marker,t_s";
+    assert!(read(long, &gantry, false).0.is_empty());
+}

@@ -33,8 +33,10 @@ use crate::solve::equations::{NormalEquations, Workspace};
 use crate::solve::normal::add_prior;
 use crate::solve::whitened::{Whitened, root_of};
 
+mod compared;
 mod draws;
 
+use compared::{Compared, Fits};
 use draws::Draws;
 
 /// Samples that are looked at.
@@ -55,8 +57,6 @@ const AT_REST: f64 = 2e-3;
 const SHOWN: f64 = 10.0;
 /// So many draws must be seen to be larger than half of their σ, as two of three are: one or two of them are a step.
 const DRAWS: usize = 4;
-/// What alone explains more than a joint's scatter alone by this much is no scatter: twice the log-likelihood ratio of 20 : 1.
-const DISTINCT: f64 = 6.0;
 /// The noise of all joints beside one that scatters, as a share of the one that was found with it.
 const OTHERS: f64 = 0.1;
 
@@ -135,43 +135,6 @@ struct Level {
     log_det: f64,
 }
 
-/// −2 ln L without a suspect, with each, and with all.
-#[derive(Clone)]
-struct Fits {
-    without: f64,
-    with: Vec<f64>,
-    all: f64,
-}
-
-/// Suspects beside the scatter of one joint.
-struct Compared {
-    /// Where no joint scatters.
-    alone: Fits,
-    /// The least of each, over the joints that may scatter.
-    least: Fits,
-    /// The scatter that explains most.
-    best: Option<Scatter>,
-}
-
-impl Compared {
-    /// Whether the scatter explains as much as what gains `by` alone.
-    fn explains(&self, by: f64) -> bool {
-        self.best
-            .is_some_and(|best| best.score + SHOWN + DISTINCT >= by)
-    }
-
-    /// What is left of one suspect.
-    fn left(&self, k: usize) -> Left {
-        let score = self.alone.without - self.alone.with[k];
-        let part = (self.least.without - self.least.with[k]) / score;
-        let part = match score > 0.0 && part.is_finite() {
-            true => part.clamp(0.0, 1.0),
-            false => 1.0,
-        };
-        Left { score, part }
-    }
-}
-
 impl Solution {
     /// Takes from the significant changes of a scan what a joint that scatters explains.
     pub(super) fn beside_scatter(&self, mut scan: ChangeScan, borders: &[usize]) -> ChangeScan {
@@ -205,7 +168,7 @@ impl Solution {
     }
 
     /// What suspects explain beside a joint that scatters; `None` where no joint does, where all of them together explain clearly more than
-    /// that, or of fewer than 20 samples. `borders`: the first sample of every recording but the first.
+    /// that or are no trace of it, or of fewer than 20 samples. `borders`: the first sample of every recording but the first.
     #[must_use]
     pub fn suspects_beside_scatter(
         &self,
@@ -217,7 +180,8 @@ impl Solution {
         }
         let suspects = &suspects[..suspects.len().min(SUSPECTS)];
         let found = self.compared(suspects, borders)?;
-        if !found.explains(found.alone.without - found.alone.all) {
+        let all = found.alone.without - found.alone.all;
+        if !found.explains(all) || found.leaves_suspects() {
             return None;
         }
         Some(BesideScatter {
@@ -238,7 +202,10 @@ impl Solution {
             .flatten()
             .filter_map(of)
             .collect();
-        let alone = levels.first()?.without_scatter();
+        let alone = levels
+            .iter()
+            .map(Level::without_scatter)
+            .reduce(Fits::least)?;
         let mut cases: Vec<(usize, usize, Vec<usize>, bool)> = Vec::new();
         for (l, level) in levels.iter().enumerate() {
             for (j, joint) in level.joints.iter().enumerate() {

@@ -196,15 +196,15 @@ impl Problem {
 
     /// Declares an effect that is not modeled, for the goodness-of-fit test.
     pub fn candidate(&mut self, edge: EdgeId, kind: EffectKind, values: Vec<f64>) {
-        let name = match kind.term().source {
+        let name = match kind {
             // All joints share a clock.
-            Source::Velocity => kind.label().to_owned(),
+            EffectKind::ClockOffset => kind.label().to_owned(),
             _ => format!("{}.{}", self.edge_name(edge), kind.label()),
         };
         self.shared_candidate(edge, kind, name, values);
     }
 
-    /// The same of an effect whose coefficient joints have in common: candidates of speeds with one `name` are tested as one.
+    /// The same of an effect whose coefficient joints have in common: candidates of a clock's offset with one `name` are tested as one.
     pub fn shared_candidate(
         &mut self,
         edge: EdgeId,

@@ -59,6 +59,9 @@ fn of_hypothesis(layout: &Layout<'_>, hypothesis: &Hypothesis) -> String {
             let name = &layout.recordings[recording.0].name;
             format!("lag({name}, {:+.1} ms)", 1e3 * seconds)
         }
+        Hypothesis::Latency { joint: j, seconds } => {
+            format!("latency({}, {:+.1} ms)", joint(j), 1e3 * seconds)
+        }
         Hypothesis::RowShift { rows } => format!("rows({rows:+})"),
         Hypothesis::MissingColumn { joint: j } => format!("column({})", joint(j)),
         Hypothesis::StoodAt { joint: j, value } => {

@@ -1,6 +1,6 @@
 //! What was assumed, what could not be checked, and what these recordings cannot show.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_checks::structural::{
     Continuous, Decision, Hypothesis, JointIndex, Measured, Outcome, Scope, Scoped,
@@ -97,7 +97,7 @@ fn seen(measured: &Measured) -> (usize, usize, usize) {
     }
 }
 
-/// A gain or a fraction of a coupling that nothing in the profile accounts for.
+/// A gain, a fraction of a coupling or readings that are late, where nothing in the profile accounts for it.
 fn continuous_finding(layout: &Layout<'_>, found: &Continuous) -> Option<Finding> {
     let all = || std::iter::once(&found.hypothesis).chain(&found.alternatives);
     if all().any(|h| is_declared(layout, h)) {
@@ -155,10 +155,29 @@ fn continuous_finding(layout: &Layout<'_>, found: &Continuous) -> Option<Finding
                     .with_some("alternatives", alternatives),
             );
         }
+        Hypothesis::Latency { joint, seconds } => {
+            let name = layout.joint(joint);
+            let kind = if seconds > 0.0 {
+                "joint_behind"
+            } else {
+                "joint_ahead"
+            };
+            let timed = layout.data.recording.iter().zip(&layout.data.rates);
+            let timed: BTreeSet<&str> = timed
+                .filter(|(_, rates)| rates.is_some())
+                .map(|(recording, _)| layout.recordings[recording.0].name.as_str())
+                .collect();
+            Finding::of_kind(catalog::CLOCK_LAG, kind, Subject::joint(name))
+                .with("joint", Fact::name(name))
+                .with("offset", Fact::seconds(seconds.abs()))
+                .with("late", Fact::seconds(seconds))
+                .with("recordings", Fact::names(timed))
+        }
         _ => return None,
     };
     let unit = match found.hypothesis {
         Hypothesis::Coupling { joint, source, .. } => layout.unit_of_share(joint, source),
+        Hypothesis::Latency { .. } => Unit::Second,
         _ => Unit::One,
     };
     Some(

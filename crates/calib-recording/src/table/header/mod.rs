@@ -12,6 +12,15 @@ use crate::error::{At, Placed, Problem};
 use crate::model::JointUnit;
 use std::collections::BTreeMap;
 
+/// What is known of the robot beside a table.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Known<'a> {
+    /// Names of its joints.
+    pub joints: &'a [String],
+    /// Whether the table is its own log.
+    pub of_robot: bool,
+}
+
 /// Meaning of one column.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Column {
@@ -97,7 +106,11 @@ pub(super) struct Layout {
 
 impl Layout {
     /// Reads the header.
-    pub(super) fn new(line: u64, names: Vec<String>, map: Option<&ColumnMap>) -> Placed<Layout> {
+    pub(super) fn new(
+        line: u64,
+        names: Vec<String>,
+        (map, known): (Option<&ColumnMap>, Known<'_>),
+    ) -> Placed<Layout> {
         let at = || At::Line(line);
         check_unique(&names).map_err(|problem| (at(), problem))?;
         let mut layout = Layout {
@@ -110,7 +123,7 @@ impl Layout {
             mapped::apply(&mut layout, map, &mut mapped).map_err(|problem| (at(), problem))?;
         }
         layout
-            .by_rules(&mapped, map.is_some())
+            .by_rules(&mapped, map.is_some(), known)
             .map_err(|problem| (at(), problem))?;
         layout.name_poses();
         Ok(layout)

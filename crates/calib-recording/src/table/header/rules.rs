@@ -2,7 +2,7 @@
 //! with a column map: ignored, and listed.
 
 use super::naming::{Meaning, Part, meaning, nearest_rule};
-use super::{BodyPlan, Column, Layout, MarkerPlan, Rotation, SlotKind};
+use super::{BodyPlan, Column, Known, Layout, MarkerPlan, Rotation, SlotKind};
 use crate::error::Problem;
 use crate::model::JointUnit;
 use std::collections::BTreeMap;
@@ -17,17 +17,74 @@ struct Entity {
     dotted: bool,
 }
 
+/// The joint that a column of a coordinate would be by its name: `x` of `x_mm`, `base_x` of `base_x_m`.
+fn joint_of(column: &str) -> Option<&str> {
+    let coordinate = matches!(
+        meaning(column),
+        Meaning::Part { entity, part: Part::Axis(_), dotted, .. } if entity.is_empty() || !dotted
+    );
+    let name = column.rsplit_once('_').map(|(name, _)| name);
+    name.filter(|_| coordinate)
+}
+
+/// The robot's joints whose columns read as coordinates. Three coordinates of one thing may be a marker: they are joints where all three are called
+/// so, and coordinates without a name where other markers or bodies have one, or where the robot alone wrote the table.
+fn joints_like_coordinates<'n>(
+    names: &'n [String],
+    mapped: &[bool],
+    known: Known<'_>,
+) -> Vec<&'n str> {
+    let own = names.iter().zip(mapped).filter(|(_, mapped)| !**mapped);
+    let meanings = || own.clone().map(|(name, _)| meaning(name));
+    if known.joints.is_empty() || meanings().any(|m| matches!(m, Meaning::Entity)) {
+        return Vec::new();
+    }
+    let others = known.of_robot
+        || meanings().any(|m| matches!(m, Meaning::Part { entity, .. } if !entity.is_empty()));
+    let is_joint = |name: &str| known.joints.iter().any(|joint| joint == name);
+    let coordinates: Vec<&str> = own.filter_map(|(name, _)| joint_of(name)).collect();
+    let of = |name: &str| {
+        // `base_` of `base_x`, nothing of `x`.
+        let entity = &name[..name.len() - 1];
+        let same = |other: &&&str| other.len() == name.len() && other.starts_with(entity);
+        let together: Vec<&&str> = coordinates.iter().filter(same).collect();
+        let all = together.iter().all(|name| is_joint(name));
+        all && (together.len() < 3 || !entity.is_empty() || others)
+    };
+    let joints = coordinates.iter().copied();
+    joints.filter(|name| is_joint(name) && of(name)).collect()
+}
+
+/// The column of one of these joints.
+fn of_joint<'n>(column: &'n str, joints: &[&str]) -> Option<Meaning<'n>> {
+    let name = joint_of(column).filter(|name| joints.contains(name))?;
+    let Meaning::Part { scale, .. } = meaning(column) else {
+        return None;
+    };
+    Some(Meaning::Joint {
+        name,
+        unit: JointUnit::Length,
+        scale,
+    })
+}
+
 impl Layout {
     /// The columns that are not mapped, by our rules; `lenient`: unknown ones are ignored.
-    pub(super) fn by_rules(&mut self, mapped: &[bool], lenient: bool) -> Result<(), Problem> {
+    pub(super) fn by_rules(
+        &mut self,
+        mapped: &[bool],
+        lenient: bool,
+        known: Known<'_>,
+    ) -> Result<(), Problem> {
         let names = self.names.clone();
         let mut entities: BTreeMap<&str, Entity> = BTreeMap::new();
         let mut ignored = Vec::new();
         // A column `point` beside named markers is somebody's remark.
         let is_nameless = |name: &String| matches!(meaning(name), Meaning::Part { entity: "", .. });
         let nameless = names.iter().any(is_nameless);
+        let joints = joints_like_coordinates(&names, mapped, known);
         for (i, name) in names.iter().enumerate().filter(|&(i, _)| !mapped[i]) {
-            match meaning(name) {
+            match of_joint(name, &joints).unwrap_or_else(|| meaning(name)) {
                 Meaning::Time(unit) if self.time.is_none() => {
                     self.time = Some(self.slot(i, SlotKind::Time, unit.per_second()))
                 }
