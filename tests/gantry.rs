@@ -224,7 +224,7 @@ fn a_sliding_joint_that_moved_without_a_column_is_named() {
         let said = dir.calib(["check", "gantry.yaml"]).expect(3).stdout;
         let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(
-            said.contains(&format!("{joint} [joint-column-missing]")),
+            said.contains(&format!("error[joint-column-missing] poses: {joint} ")),
             "{said}"
         );
         assert!(
