@@ -315,6 +315,27 @@ fn the_sign_of_a_wrist_with_markers_near_its_axis() {
     assert!(remedy.contains("<axis xyz="), "{remedy}");
 }
 
+/// An axis of the URDF along another coordinate, forwards and backwards, and one that was not written, over designs and markers.
+#[test]
+fn an_axis_of_the_urdf_along_another_coordinate_is_named() {
+    const ELBOW: &str = "<origin xyz=\"0.375 0 0\" rpy=\"0 0 0\"/>\n    <axis xyz=\"0 1 0\"/>";
+    let cases = [
+        (Design::Random(30), FOUR, "<axis xyz=\"0 0 1\"/>"),
+        (Design::Random(30), ONE, "<axis xyz=\"-1 0 0\"/>"),
+        (Design::Sweeps, FOUR, ""),
+        (Design::Sweeps, ONE, "<axis xyz=\"0 0 -1\"/>"),
+    ];
+    for (k, (design, markers, axis)) in cases.into_iter().enumerate() {
+        let setting = Setting::new(design, markers, 40 + k as u64);
+        let changed = ELBOW.replace("<axis xyz=\"0 1 0\"/>", axis);
+        let dir = setting
+            .folder()
+            .edit("robots/ripley/r17.urdf", ELBOW, &changed);
+        let finding = named(&dir, "joint-axis", "elbow", &setting.tables());
+        assert_eq!(finding["facts"]["axis"], "0 1 0", "{k}: {finding:#}");
+    }
+}
+
 #[test]
 fn a_wrong_sign_seen_by_one_marker() {
     for (design, seed) in [(Design::Random(30), 4), (Design::Sweeps, 5)] {

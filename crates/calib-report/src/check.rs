@@ -181,6 +181,7 @@ impl DataCheck {
             Self::Validation => &[catalog::HELD_OUT_IN_TRAINING],
             Self::Structure => &[
                 catalog::JOINT_SIGN,
+                catalog::JOINT_AXIS,
                 catalog::JOINT_ORDER,
                 catalog::JOINT_OFFSET,
                 catalog::JOINT_COUPLING,

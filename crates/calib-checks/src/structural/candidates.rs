@@ -1,8 +1,11 @@
 //! Which hypotheses are tried on given data, and in which scopes.
 
+use super::chain::Motion;
 use super::correct::same_shape;
 use super::data::{Body, Data, Measured};
-use super::hypothesis::{Hypothesis, PoseMistake, QuarterTurns, Scope, TRACKER_UNITS, UnitMistake};
+use super::hypothesis::{
+    Direction, Hypothesis, PoseMistake, QuarterTurns, Scope, TRACKER_UNITS, UnitMistake,
+};
 use super::ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex};
 
 /// A column whose values differ by less (rad or m) carries no information about its own sign or unit.
@@ -223,6 +226,27 @@ pub(crate) fn of_still(data: &Data) -> Vec<Candidate> {
     let still = still.filter(|joint| data.chain.turns(joint.0).is_some());
     still
         .map(|joint| (Hypothesis::MissingColumn { joint }, vec![Scope::All]))
+        .collect()
+}
+
+/// Axes of joints along other coordinates than the model has them: a URDF has `1 0 0` where none is written. What is reversed is the joint's sign, and an
+/// axis between coordinates was written with care.
+pub(crate) fn of_axes(data: &Data) -> Vec<Candidate> {
+    /// A cosine from which on a direction is that of a coordinate axis.
+    const ALONG: f64 = 1.0 - 1e-6;
+    let moving = data.relevant_joints().into_iter();
+    let moving = moving.filter(|joint| span(data, *joint) > MOVES);
+    moving
+        .filter_map(|joint| match data.chain.joints()[joint.0].motion {
+            Motion::Fixed => None,
+            Motion::Revolute(axis) | Motion::Prismatic(axis) => Some((joint, axis)),
+        })
+        .filter(|(_, axis)| axis.amax() > ALONG)
+        .flat_map(|(joint, axis)| {
+            let others = Direction::ALL.into_iter();
+            let others = others.filter(move |along| along.vector().dot(&axis).abs() < 0.5);
+            others.map(move |along| (Hypothesis::Axis { joint, along }, vec![Scope::All]))
+        })
         .collect()
 }
 

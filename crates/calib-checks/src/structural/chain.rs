@@ -148,6 +148,19 @@ impl Chain {
         self
     }
 
+    /// The same chain with another axis of a joint that moves.
+    ///
+    /// An index that does not exist changes nothing.
+    #[must_use]
+    pub fn with_axis(mut self, joint: JointIndex, to: Unit<Vector3<f64>>) -> Self {
+        if let Some(Motion::Revolute(axis) | Motion::Prismatic(axis)) =
+            self.joints.get_mut(joint.0).map(|joint| &mut joint.motion)
+        {
+            *axis = to;
+        }
+        self
+    }
+
     /// All joints.
     #[must_use]
     pub fn joints(&self) -> &[ChainJoint] {

@@ -20,6 +20,9 @@ pub(crate) fn correct(scoped: &Scoped, data: &Data) -> Data {
     match *h {
         Hypothesis::RowShift { rows } => shift(&mut corrected, data, &inside, rows),
         Hypothesis::WrongLink { body, link } => corrected.bodies[body.0].link = link,
+        Hypothesis::Axis { joint, along } => {
+            corrected.chain = corrected.chain.with_axis(joint, along.vector());
+        }
         Hypothesis::ExchangedBodies { first, second } => {
             exchange_bodies(&mut corrected, scoped.scope, &inside, first, second)
         }

@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::apply::{apply, apply_all};
-use super::candidates::{Candidate, candidates, of_still, span};
+use super::candidates::{Candidate, candidates, of_axes, of_still, span};
 use super::continuous;
 use super::data::{Data, DataError};
 use super::expected::expected;
@@ -127,23 +127,23 @@ fn decided(asked: &Asked<'_>, outcome: &mut Outcome) -> Correction {
         ..
     } = *asked;
     outcome.expected = expected(data, screened, options);
-    // Joints that never moved are asked where something is wrong: no other data say where they stood.
+    // Where something is wrong, joints that never moved are asked, since no other data say where they stood, and axes of the model.
     let wrong = outcome.expected.is_some_and(|e| ranking.none.rms > e.limit);
-    let still = if wrong && options.suspects.is_empty() {
-        of_still(data)
+    let more = if wrong && options.suspects.is_empty() {
+        [of_still(data), of_axes(data)].concat()
     } else {
         Vec::new()
     };
-    let (all, with_still) = (
-        [asked.candidates, &still].concat(),
-        ranking.with(Ranking::of(data, &still, screened)),
+    let (all, with_more) = (
+        [asked.candidates, &more].concat(),
+        ranking.with(Ranking::of(data, &more, screened)),
     );
     let asked = &Asked {
         candidates: &all,
-        ranking: &with_still,
+        ranking: &with_more,
         ..*asked
     };
-    let ranking = &with_still;
+    let ranking = &with_more;
     if options.list_invisible {
         outcome.invisible = invisible(data, ranking, screened, options);
     }

@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::sync::LazyLock;
 
-use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 use serde::Serialize;
 
 use super::ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex};
@@ -111,6 +111,48 @@ impl QuarterTurns {
     }
 }
 
+/// A coordinate axis, forwards or backwards.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+pub enum Direction {
+    /// 1 0 0
+    X,
+    /// −1 0 0
+    MinusX,
+    /// 0 1 0
+    Y,
+    /// 0 −1 0
+    MinusY,
+    /// 0 0 1
+    Z,
+    /// 0 0 −1
+    MinusZ,
+}
+
+impl Direction {
+    /// Each.
+    pub const ALL: [Self; 6] = [
+        Self::X,
+        Self::MinusX,
+        Self::Y,
+        Self::MinusY,
+        Self::Z,
+        Self::MinusZ,
+    ];
+
+    /// As a unit vector.
+    #[must_use]
+    pub fn vector(self) -> Unit<Vector3<f64>> {
+        match self {
+            Self::X => Vector3::x_axis(),
+            Self::MinusX => -Vector3::x_axis(),
+            Self::Y => Vector3::y_axis(),
+            Self::MinusY => -Vector3::y_axis(),
+            Self::Z => Vector3::z_axis(),
+            Self::MinusZ => -Vector3::z_axis(),
+        }
+    }
+}
+
 /// A convention of a pose that was misread.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 pub enum PoseMistake {
@@ -167,6 +209,13 @@ pub enum Hypothesis {
         joint: JointIndex,
         /// 1 for none.
         factor: f64,
+    },
+    /// The joint moves along (about) another coordinate axis of its frame than the model has it.
+    Axis {
+        /// Joint.
+        joint: JointIndex,
+        /// Its true axis.
+        along: Direction,
     },
     /// The zero of the joint is off by a multiple of 90°.
     Offset {

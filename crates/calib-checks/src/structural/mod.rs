@@ -89,8 +89,8 @@ pub use continuous::Continuous;
 pub use data::{Body, Data, DataError, Measured};
 pub use decide::{explain, registration_residual};
 pub use hypothesis::{
-    Hypothesis, Length, PoseMistake, QuarterTurns, Scope, Scoped, TRACKER_UNITS, UnitMistake,
-    axes_rotation,
+    Direction, Hypothesis, Length, PoseMistake, QuarterTurns, Scope, Scoped, TRACKER_UNITS,
+    UnitMistake, axes_rotation,
 };
 pub use ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex, SampleIndex};
 pub use jump::{Jump, Moved, Size};

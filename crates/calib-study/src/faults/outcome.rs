@@ -187,8 +187,9 @@ impl CaseResult {
 }
 
 /// Findings that name a cause.
-const NAMES: [&str; 21] = [
+const NAMES: [&str; 22] = [
     "joint-sign",
+    "joint-axis",
     "joint-order",
     "unit-mismatch",
     "joint-coupling",

@@ -4,6 +4,8 @@ use calib_checks::structural::{
     Correction, Hypothesis, Length, PoseMistake, QuarterTurns, Scope, Scoped, UnitMistake,
 };
 
+use nalgebra::Vector3;
+
 use super::layout::Layout;
 
 /// The code of a correction: those of its parts, joined by `+`.
@@ -47,6 +49,9 @@ fn of_hypothesis(layout: &Layout<'_>, hypothesis: &Hypothesis) -> String {
             )
         }
         Hypothesis::Gain { joint: j, factor } => format!("gain({}, {factor:.4})", joint(j)),
+        Hypothesis::Axis { joint: j, along } => {
+            format!("axis({}, {})", joint(j), axis(&along.vector()))
+        }
         Hypothesis::Offset { joint: j, turns } => {
             let degrees = match turns {
                 QuarterTurns::Plus90 => "+90",
@@ -91,6 +96,12 @@ fn of_hypothesis(layout: &Layout<'_>, hypothesis: &Hypothesis) -> String {
         }
         _ => "other".to_owned(),
     }
+}
+
+/// An axis as a URDF has it, with few digits; −0 is 0.
+pub fn axis(axis: &Vector3<f64>) -> String {
+    let number = |x: &f64| ((x * 1e6).round() / 1e6 + 0.0).to_string();
+    axis.iter().map(number).collect::<Vec<_>>().join(" ")
 }
 
 /// A unit of length, as in names of columns.

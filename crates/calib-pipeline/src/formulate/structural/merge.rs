@@ -53,6 +53,7 @@ fn explains(named: &Finding, finding: &Finding, fitted: &[&String]) -> bool {
 fn of_joints(id: Id) -> bool {
     [
         catalog::JOINT_SIGN,
+        catalog::JOINT_AXIS,
         catalog::JOINT_ORDER,
         catalog::JOINT_OFFSET,
         catalog::JOINT_COUPLING,

@@ -92,6 +92,8 @@ fn of_hypothesis(layout: &Layout<'_>, outcome: &Outcome, scoped: &Scoped) -> Fin
         Hypothesis::Sign { joint } => {
             of_joint(catalog::JOINT_SIGN, joint).with_some("axis", reversed_axis(layout, joint))
         }
+        Hypothesis::Axis { joint, along } => of_joint(catalog::JOINT_AXIS, joint)
+            .with("axis", Fact::name(codes::axis(&along.vector()))),
         Hypothesis::Exchange { first, second } => {
             of_joint(catalog::JOINT_ORDER, first).with("other", other(second))
         }
@@ -230,14 +232,7 @@ fn reversed_axis(layout: &Layout<'_>, joint: JointIndex) -> Option<Fact> {
     let model = &layout.inputs.robot.model;
     let id = model.joint_ids().nth(joint.0)?;
     let axis = model.joint(id).kind.axis()?;
-    let number = |x: f64| {
-        // Axes are written with few digits; −0 is 0.
-        let rounded = (-x * 1e6).round() / 1e6 + 0.0;
-        rounded.to_string()
-    };
-    Some(Fact::name(
-        [number(axis.x), number(axis.y), number(axis.z)].join(" "),
-    ))
+    Some(Fact::name(codes::axis(&-axis.into_inner())))
 }
 
 fn of_one_joint(mistake: UnitMistake) -> &'static str {
