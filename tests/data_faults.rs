@@ -323,6 +323,41 @@ fn exchanged_markers_are_put_right_and_listed() {
     assert_eq!(clean["transforms"], report["transforms"]);
 }
 
+/// A marker of one body is called like a marker of another: in all recordings, or in one. It is the calibration of the recordings before.
+#[test]
+fn labels_of_two_bodies_that_are_exchanged_are_put_right() {
+    let tables = ["base_sweep", "wrist_sweep", "arm_poses", "checks"];
+    let calibrated = |dir: &Scratch| {
+        assert_eq!(dir.calib(["run", PROFILE, "--out", "out"]).code, 0);
+        dir.json("out/report.json")
+    };
+    let clean = calibrated(&ripley())["transforms"].clone();
+    for exchanged in [&tables[..], &tables[2..3], &tables[3..]] {
+        let dir = exchanged.iter().fold(ripley(), |dir, table| {
+            let path = format!("robots/ripley/{table}.csv");
+            let text = dir.read(&path);
+            let text = text
+                .replace("linkM_2.", "\u{1}")
+                .replace("gripM_3.", "linkM_2.")
+                .replace('\u{1}', "gripM_3.");
+            dir.file(&path, text)
+        });
+        let report = calibrated(&dir);
+        let found = report["findings"].as_array().expect("a list").iter();
+        let found: Vec<&Value> = found
+            .filter(|f| f["id"] == "marker-swap-repaired")
+            .collect();
+        assert_eq!(found.len(), exchanged.len(), "{found:#?}");
+        for finding in found {
+            assert_eq!(finding["facts"]["kind"], "between_bodies");
+            let names = [&finding["facts"]["first"], &finding["facts"]["second"]];
+            assert!(names.contains(&&"linkM_2".into()) && names.contains(&&"gripM_3".into()));
+        }
+        assert_eq!(report["transforms"], clean);
+        assert_ne!(report["verdict"], "rejected");
+    }
+}
+
 /// One mistake: its name, the finding that must name it, and how it is made.
 type Mistake = (&'static str, &'static str, fn(Scratch) -> Scratch);
 

@@ -336,6 +336,34 @@ fn an_axis_of_the_urdf_along_another_coordinate_is_named() {
     }
 }
 
+/// A joint that follows another one has no column of its own: the multiplier of the wrong sign is an axis that is reversed.
+#[test]
+fn a_joint_that_follows_another_one_the_wrong_way_is_named() {
+    const WRIST: &str = "<joint name=\"wrist_pitch\" type=\"revolute\">";
+    let following = |multiplier: &str| {
+        format!("{WRIST}\n    <mimic joint=\"elbow\" multiplier=\"{multiplier}\"/>")
+    };
+    let urdf = "robots/ripley/r17.urdf";
+    let setting = Setting::new(Design::Random(30), FOUR, 50);
+    let dir = setting.folder().edit(urdf, WRIST, &following("-1")).edit(
+        "arm.yaml",
+        "wrist_pitch_deg: [-90, 90], ",
+        "",
+    );
+    dir.calib(["simulate", "arm.yaml", "--out", "."]).expect(0);
+    let loud = |dir: &Scratch| {
+        let found = findings(dir);
+        found.iter().any(|f| f["severity"] == "error")
+    };
+    assert!(!loud(&dir));
+    let dir = dir.edit(urdf, &following("-1"), &following("1"));
+    let finding = named(&dir, "joint-axis", "wrist_pitch", &setting.tables());
+    assert_eq!(finding["facts"]["axis"], "0 -1 0", "{finding:#}");
+    let remedy = finding["remedy"].as_str().expect("text");
+    let expected = "a `multiplier` in `<mimic joint=\"elbow\"/>` of the other sign";
+    assert!(remedy.contains(expected), "{remedy}");
+}
+
 #[test]
 fn a_wrong_sign_seen_by_one_marker() {
     for (design, seed) in [(Design::Random(30), 4), (Design::Sweeps, 5)] {

@@ -1,5 +1,7 @@
 //! Which hypotheses are tried on given data, and in which scopes.
 
+use std::collections::BTreeSet;
+
 use super::chain::Motion;
 use super::correct::same_shape;
 use super::data::{Body, Data, Measured};
@@ -229,22 +231,37 @@ pub(crate) fn of_still(data: &Data) -> Vec<Candidate> {
         .collect()
 }
 
-/// Axes of joints along other coordinates than the model has them: a URDF has `1 0 0` where none is written. What is reversed is the joint's sign, and an
+/// Axes of joints along other coordinates than the model has them: a URDF has `1 0 0` where none is written. What is reversed is the joint's sign, but of a joint
+/// that follows another one, whose multiplier may have the other sign. An
 /// axis between coordinates was written with care.
 pub(crate) fn of_axes(data: &Data) -> Vec<Candidate> {
     /// A cosine from which on a direction is that of a coordinate axis.
     const ALONG: f64 = 1.0 - 1e-6;
-    let moving = data.relevant_joints().into_iter();
-    let moving = moving.filter(|joint| span(data, *joint) > MOVES);
+    let bodies = data.bodies.iter();
+    let paths = bodies.flat_map(|body| data.chain.path(body.link));
+    let joints: BTreeSet<JointIndex> = paths.collect();
+    let moving = joints.into_iter().filter_map(|joint| {
+        let own = &data.chain.joints()[joint.0];
+        let moves = own
+            .law
+            .iter()
+            .any(|(source, _)| span(data, *source) > MOVES);
+        // A joint that follows another one has no sign of its own.
+        let follows = own.law.iter().all(|(source, _)| *source != joint);
+        match own.motion {
+            Motion::Revolute(axis) | Motion::Prismatic(axis) if moves => {
+                Some((joint, axis, follows))
+            }
+            _ => None,
+        }
+    });
     moving
-        .filter_map(|joint| match data.chain.joints()[joint.0].motion {
-            Motion::Fixed => None,
-            Motion::Revolute(axis) | Motion::Prismatic(axis) => Some((joint, axis)),
-        })
-        .filter(|(_, axis)| axis.amax() > ALONG)
-        .flat_map(|(joint, axis)| {
-            let others = Direction::ALL.into_iter();
-            let others = others.filter(move |along| along.vector().dot(&axis).abs() < 0.5);
+        .filter(|(_, axis, _)| axis.amax() > ALONG)
+        .flat_map(|(joint, axis, follows)| {
+            let others = Direction::ALL.into_iter().filter(move |along| {
+                let same = along.vector().dot(&axis);
+                same.abs() < 0.5 || follows && same < 0.0
+            });
             others.map(move |along| (Hypothesis::Axis { joint, along }, vec![Scope::All]))
         })
         .collect()

@@ -48,6 +48,9 @@ super::topic! {
         "": Warning,
             "{rows:row} had exchanged labels, corrected by the distances between the markers: {exchanges}.",
             "Place the markers at clearly different distances before the next recording. This recording needs nothing.";
+        "between_bodies": Warning,
+            "Markers `{first}` and `{second}` have each other's labels: the distances in their bodies change by {change}, and exchanged both are rigid. This was corrected.",
+            "Correct the labels in the tracker's software, or state it in the profile where all recordings have them so: `names: {{first}: {second}, {second}: {first}}`.";
     }
     /// One marker out of place in some rows.
     MARKER_OUTLIER = "marker-outlier" {

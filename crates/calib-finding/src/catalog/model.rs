@@ -10,8 +10,8 @@ super::topic! {
     /// A joint moves along another axis than the URDF has.
     JOINT_AXIS = "joint-axis" {
         "": Error,
-            "The recordings fit the nominal robot to {none} rms, but to {best} with the axis of joint `{joint}` along `{axis}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
-            "Compare the axis in the URDF with the robot: `<axis xyz=\"{axis}\"/>` in the frame of joint `{joint}`; without this element it is `1 0 0`.";
+            "The recordings fit the nominal robot to {none} rms, but to {best} with the axis of joint `{joint}`[[, which follows `{follows}`,]] along `{axis}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "Compare the axis in the URDF with the robot: `<axis xyz=\"{axis}\"/>` in the frame of joint `{joint}`; without this element it is `1 0 0`.[[ A reversed axis of a joint that follows another one is a `multiplier` in `<mimic joint=\"{follows}\"/>` of the other sign.]]";
     }
     /// Two joint columns are exchanged.
     JOINT_ORDER = "joint-order" {

@@ -8,6 +8,7 @@ pub(crate) mod condensed;
 pub mod conditions;
 pub(crate) mod effects;
 pub mod estimators;
+mod exchanged;
 pub mod excluded;
 pub mod inputs;
 pub mod load;

@@ -13,6 +13,7 @@ use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::BodyKind;
 use nalgebra::Point3;
 
+use crate::prepare::exchanged::between_bodies;
 use crate::prepare::inputs::{Inputs, Loaded};
 
 /// Distances stay within this many σ: one Gaussian value in 10¹⁵ does not.
@@ -36,7 +37,8 @@ pub fn relabel(inputs: &mut Inputs) -> Vec<Finding> {
         })
         .collect();
     let stated = inputs.robot.profile.tracker.marker_sigma;
-    let mut findings = Vec::new();
+    // The distances of a body whose labels are another's say nothing of its rows.
+    let mut findings = between_bodies(inputs);
     for (body, markers) in bodies {
         findings.extend(relabel_body(
             &mut inputs.recordings,

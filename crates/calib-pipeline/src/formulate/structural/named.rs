@@ -92,8 +92,14 @@ fn of_hypothesis(layout: &Layout<'_>, outcome: &Outcome, scoped: &Scoped) -> Fin
         Hypothesis::Sign { joint } => {
             of_joint(catalog::JOINT_SIGN, joint).with_some("axis", reversed_axis(layout, joint))
         }
-        Hypothesis::Axis { joint, along } => of_joint(catalog::JOINT_AXIS, joint)
-            .with("axis", Fact::name(codes::axis(&along.vector()))),
+        Hypothesis::Axis { joint, along } => {
+            let law = &layout.data.chain.joints()[joint.0].law;
+            let own = law.iter().any(|(source, _)| *source == joint);
+            let follows = law.iter().map(|(source, _)| other(*source));
+            of_joint(catalog::JOINT_AXIS, joint)
+                .with("axis", Fact::name(codes::axis(&along.vector())))
+                .with_some("follows", follows.last().filter(|_| !own))
+        }
         Hypothesis::Exchange { first, second } => {
             of_joint(catalog::JOINT_ORDER, first).with("other", other(second))
         }

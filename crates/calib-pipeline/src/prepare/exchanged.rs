@@ -1,0 +1,164 @@
+//! Labels of two bodies that are exchanged in a whole recording: a marker of the one is called like a marker of the other.
+//!
+//! Where the bodies move against each other, both change their shape from row to row. Of all pairs of one marker of each, the one is exchanged that
+//! leaves both rigid; where several do, or none does, nothing is changed, and the data checks name the markers that move. Recordings in which the
+//! bodies do not move against each other are compared with the shapes that were found so.
+
+use std::collections::BTreeMap;
+
+use calib_finding::{Fact, Finding, Subject, catalog};
+use calib_geometry::statistics::upper_median;
+use calib_profile::BodyKind;
+use nalgebra::Point3;
+
+use crate::prepare::inputs::{Inputs, Loaded};
+
+/// Change of a distance, m, from which on a body is not the one that it is called.
+const ANOTHER: f64 = 5e-3;
+/// The same of a body that is, and what is left of the change at most.
+const SAME: (f64, f64) = (2e-3, 0.1);
+/// Rows from which a typical distance is worth something.
+const ENOUGH: usize = 5;
+
+/// Puts exchanged labels right; one finding for each exchange.
+pub(super) fn between_bodies(inputs: &mut Inputs) -> Vec<Finding> {
+    let profile = inputs.robot.profile.bodies.values();
+    let bodies: Vec<Vec<String>> = profile
+        .filter_map(|body| match &body.kind {
+            BodyKind::Markers { names, .. } if names.len() >= 3 => Some(names.clone()),
+            _ => None,
+        })
+        .collect();
+    let mut findings = Vec::new();
+    for (a, first) in bodies.iter().enumerate() {
+        for second in &bodies[a + 1..] {
+            let recordings = &mut inputs.recordings;
+            findings.extend(of_bodies(recordings, [first, second]));
+        }
+    }
+    findings
+}
+
+fn of_bodies(recordings: &mut BTreeMap<String, Loaded>, bodies: [&[String]; 2]) -> Vec<Finding> {
+    let mut found = Vec::new();
+    let mut known = None;
+    for loaded in recordings.values_mut() {
+        if let Some((pair, change)) = by_motion(loaded, bodies) {
+            found.push(exchange(loaded, pair, change));
+            known =
+                known.or_else(|| Some((pair, bodies.map(|body| Shape::of(loaded, body, None)))));
+        }
+    }
+    let Some((pair, shapes)) = known else {
+        return found;
+    };
+    for loaded in recordings.values_mut() {
+        if let Some(change) = by_shape(loaded, bodies, pair, &shapes) {
+            found.push(exchange(loaded, pair, change));
+        }
+    }
+    found
+}
+
+/// A marker of the first body and one of the second.
+type Pair<'a> = (&'a String, &'a String);
+
+/// The only pair whose exchange leaves both bodies rigid, and by how much their distances changed, m.
+fn by_motion<'a>(loaded: &Loaded, bodies: [&'a [String]; 2]) -> Option<(Pair<'a>, f64)> {
+    let [a, b] = bodies.map(|body| Shape::of(loaded, body, None).change());
+    let (a, b) = (a?, b?);
+    if a.min(b) < ANOTHER {
+        return None;
+    }
+    let rigid = |body, before: f64, (x, y): Pair<'_>| {
+        let after = Shape::of(loaded, body, Some((x, y))).change();
+        after.is_some_and(|after| after < SAME.0.min(SAME.1 * before))
+    };
+    let [first, second] = bodies;
+    let pairs = first
+        .iter()
+        .flat_map(|x| second.iter().map(move |y| (x, y)));
+    let mut right = pairs.filter(|(x, y)| rigid(first, a, (x, y)) && rigid(second, b, (y, x)));
+    let pair = right.next().filter(|_| right.next().is_none())?;
+    Some((pair, a.max(b)))
+}
+
+/// By how much distances differ from those of these shapes, m, where both bodies have their shape with this pair exchanged and not as they are.
+fn by_shape(
+    loaded: &Loaded,
+    bodies: [&[String]; 2],
+    (x, y): Pair<'_>,
+    shapes: &[Shape; 2],
+) -> Option<f64> {
+    let mut largest: f64 = 0.0;
+    for ((body, pair), shape) in bodies.into_iter().zip([(x, y), (y, x)]).zip(shapes) {
+        let as_it_is = Shape::of(loaded, body, None).apart(shape)?;
+        let exchanged = Shape::of(loaded, body, Some(pair)).apart(shape)?;
+        if as_it_is < ANOTHER || exchanged > SAME.0.min(SAME.1 * as_it_is) {
+            return None;
+        }
+        largest = largest.max(as_it_is);
+    }
+    Some(largest)
+}
+
+fn exchange(loaded: &mut Loaded, (x, y): Pair<'_>, change: f64) -> Finding {
+    let tracks = &mut loaded.poses.markers;
+    if let (Some(of_x), Some(of_y)) = (tracks.remove(x), tracks.remove(y)) {
+        tracks.insert(x.clone(), of_y);
+        tracks.insert(y.clone(), of_x);
+    }
+    let subject = Subject::default().in_recording(&loaded.name);
+    Finding::of_kind(catalog::MARKER_SWAP_REPAIRED, "between_bodies", subject)
+        .with("first", Fact::name(x))
+        .with("second", Fact::name(y))
+        .with("change", Fact::meters(change))
+}
+
+/// Median and median deviation, m, of the distances between the markers of a body, by their places in the list.
+struct Shape(BTreeMap<(usize, usize), (f64, f64)>);
+
+impl Shape {
+    /// Of a body in a recording, where one of its markers is called like another one.
+    fn of(loaded: &Loaded, body: &[String], instead: Option<Pair<'_>>) -> Self {
+        let track = |marker: &String| -> &[Option<Point3<f64>>] {
+            let name = match instead {
+                Some((of, other)) if of == marker => other,
+                _ => marker,
+            };
+            loaded.poses.markers.get(name).map_or(&[], Vec::as_slice)
+        };
+        let tracks: Vec<_> = body.iter().map(track).collect();
+        let mut shape = BTreeMap::new();
+        for (i, a) in tracks.iter().enumerate() {
+            for (j, b) in tracks.iter().enumerate().skip(i + 1) {
+                let seen = a.iter().zip(*b);
+                let distances = seen.filter_map(|(a, b)| Some((a.as_ref()? - b.as_ref()?).norm()));
+                let mut distances: Vec<f64> = distances.collect();
+                if distances.len() < ENOUGH {
+                    continue;
+                }
+                let Some(middle) = upper_median(&mut distances) else {
+                    continue;
+                };
+                let mut off: Vec<f64> = distances.iter().map(|d| (d - middle).abs()).collect();
+                shape.insert((i, j), (middle, upper_median(&mut off).unwrap_or(0.0)));
+            }
+        }
+        Self(shape)
+    }
+
+    /// The largest change; `None` where nothing is seen often enough.
+    fn change(&self) -> Option<f64> {
+        self.0.values().map(|(_, change)| *change).reduce(f64::max)
+    }
+
+    /// The largest difference from another shape; `None` where they have no distance in common.
+    fn apart(&self, other: &Self) -> Option<f64> {
+        let common = self.0.iter().filter_map(|(place, (own, _))| {
+            let (known, _) = other.0.get(place)?;
+            Some((own - known).abs())
+        });
+        common.reduce(f64::max)
+    }
+}
