@@ -95,10 +95,10 @@ fn of_hypothesis(layout: &Layout<'_>, outcome: &Outcome, scoped: &Scoped) -> Fin
         Hypothesis::Axis { joint, along } => {
             let law = &layout.data.chain.joints()[joint.0].law;
             let own = law.iter().any(|(source, _)| *source == joint);
-            let follows = law.iter().map(|(source, _)| other(*source));
+            let follows = law.last().filter(|_| !own);
             of_joint(catalog::JOINT_AXIS, joint)
                 .with("axis", Fact::name(codes::axis(&along.vector())))
-                .with_some("follows", follows.last().filter(|_| !own))
+                .with_some("follows", follows.map(|(source, _)| other(*source)))
         }
         Hypothesis::Exchange { first, second } => {
             of_joint(catalog::JOINT_ORDER, first).with("other", other(second))
