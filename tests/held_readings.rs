@@ -241,6 +241,19 @@ fn a_column_that_stands_still_is_named_or_its_rows_are_left_out() {
     );
 }
 
+/// Of one marker nothing but the fit says how it scatters: 20 mm are not called the tracker's.
+#[test]
+fn noise_that_no_tracker_has_makes_no_limit_too_small() {
+    let (report, _) = calibrated(&with_a_standing_column(ONE, 0.0));
+    assert_eq!(report["verdict"], "rejected");
+    let noise = report["noise"].as_array().expect("a list").iter();
+    let marker = noise
+        .filter(|n| n["group"] == "marker")
+        .filter_map(|n| n["sigma"].as_f64());
+    assert!(marker.fold(0.0, f64::max) > 0.01, "{:#}", report["noise"]);
+    assert_ne!(report["diagnosis"]["kind"], "limit_below_noise");
+}
+
 /// Frames of one posture, positions that were asked for, readings that were rounded or cut off: each repeats readings.
 #[test]
 fn what_repeats_readings_for_another_reason_is_not_called_so() {

@@ -103,6 +103,9 @@ fn below_noise(report: &Report) -> Option<Diagnosis> {
     })
 }
 
+/// Noise of one coordinate, m, that no tracker has with which robots are calibrated: where none is stated, what the model lacks was found as noise.
+const NO_TRACKER: f64 = 0.01;
+
 /// Stated noise of the tracker over the noise that was found, at most 1: what a model lacks is found as noise, too. Where that is known, no more
 /// than the stated noise is called the tracker's anyway. Where none is stated, and the noise is far above the scatter of the markers about their bodies, it
 /// is not the tracker's.
@@ -118,6 +121,13 @@ fn stated_share(report: &Report) -> f64 {
     }
     let noise = report.noise.iter();
     let positions = noise.filter(|noise| noise.kind == NoiseKind::Position);
+    let unstated = positions.clone().filter(|noise| noise.stated.is_none());
+    if unstated
+        .filter_map(|noise| noise.sigma)
+        .any(|sigma| sigma > NO_TRACKER)
+    {
+        return 0.0;
+    }
     let shares = positions.filter_map(|noise| Some(noise.stated? / noise.sigma?));
     shares.filter(|share| *share > 0.0).fold(1.0, f64::min)
 }

@@ -76,26 +76,31 @@ pub fn rounded(value: Value) -> Value {
     rounded_to(value, DIGITS)
 }
 
-pub(crate) fn rounded_to(value: Value, digits: usize) -> Value {
+pub(crate) fn rounded_to(mut value: Value, digits: usize) -> Value {
+    round_all(&mut value, digits);
+    value
+}
+
+fn round_all(value: &mut Value, digits: usize) {
     match value {
-        Value::Number(number) if number.is_f64() => number
-            .as_f64()
-            .map_or(Value::Null, |x| Value::from(round(x, digits))),
-        Value::Array(items) => items
-            .into_iter()
-            .map(|item| rounded_to(item, digits))
-            .collect(),
-        Value::Object(map) => Value::Object(
-            map.into_iter()
-                .map(|(key, item)| (key, rounded_to(item, digits)))
-                .collect(),
-        ),
-        other => other,
+        Value::Number(number) if number.is_f64() => {
+            let rounded = number.as_f64().map(|x| Value::from(round(x, digits)));
+            *value = rounded.unwrap_or(Value::Null);
+        }
+        Value::Array(items) => items.iter_mut().for_each(|item| round_all(item, digits)),
+        Value::Object(map) => map.values_mut().for_each(|item| round_all(item, digits)),
+        _ => {}
     }
 }
 
 fn round(x: f64, digits: usize) -> f64 {
-    let rounded: f64 = format!("{x:.*e}", digits - 1).parse().unwrap_or(x);
+    /// Whole numbers below have at most so many digits that nothing is rounded.
+    const WHOLE: f64 = 1e6;
+    let whole = x.abs() < WHOLE && x.fract() == 0.0 && digits > 6;
+    let rounded = match whole {
+        true => x,
+        false => format!("{x:.*e}", digits - 1).parse().unwrap_or(x),
+    };
     if rounded == 0.0 { 0.0 } else { rounded }
 }
 

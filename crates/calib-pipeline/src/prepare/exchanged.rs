@@ -1,8 +1,8 @@
 //! Labels of two bodies that are exchanged in a whole recording: a marker of the one is called like a marker of the other.
 //!
-//! Where the bodies move against each other, both change their shape from row to row. Of all pairs of one marker of each, the one is exchanged that
-//! leaves both rigid; where several do, or none does, nothing is changed, and the data checks name the markers that move. Recordings in which the
-//! bodies do not move against each other are compared with the shapes that were found so.
+//! Where the bodies move against each other, both change their shape from row to row, each by one marker. These two are exchanged where that leaves both
+//! rigid; elsewhere nothing is changed, and the data checks name the markers that move. Recordings in which the bodies do not move against each
+//! other are compared with the shapes that were found so.
 
 use std::collections::BTreeMap;
 
@@ -17,6 +17,8 @@ use crate::prepare::inputs::{Inputs, Loaded};
 const ANOTHER: f64 = 5e-3;
 /// The same of a body that is, and what is left of the change at most.
 const SAME: (f64, f64) = (2e-3, 0.1);
+/// Rows that are looked at.
+const ROWS: usize = 400;
 /// Rows from which a typical distance is worth something.
 const ENOUGH: usize = 5;
 
@@ -63,24 +65,21 @@ fn of_bodies(recordings: &mut BTreeMap<String, Loaded>, bodies: [&[String]; 2]) 
 /// A marker of the first body and one of the second.
 type Pair<'a> = (&'a String, &'a String);
 
-/// The only pair whose exchange leaves both bodies rigid, and by how much their distances changed, m.
+/// The one marker of each body whose distances change, where exchanged both bodies are rigid, and by how much the distances changed, m.
 fn by_motion<'a>(loaded: &Loaded, bodies: [&'a [String]; 2]) -> Option<(Pair<'a>, f64)> {
-    let [a, b] = bodies.map(|body| Shape::of(loaded, body, None).change());
-    let (a, b) = (a?, b?);
-    if a.min(b) < ANOTHER {
-        return None;
+    let shapes = bodies.map(|body| Shape::of(loaded, body, None));
+    let moving = |k: usize| Some(&bodies[k][shapes[k].moving()?]);
+    let (x, y) = (moving(0)?, moving(1)?);
+    let mut largest: f64 = 0.0;
+    for ((body, pair), shape) in bodies.into_iter().zip([(x, y), (y, x)]).zip(&shapes) {
+        let before = shape.change()?;
+        let after = Shape::of(loaded, body, Some(pair)).change()?;
+        if after > SAME.0.min(SAME.1 * before) {
+            return None;
+        }
+        largest = largest.max(before);
     }
-    let rigid = |body, before: f64, (x, y): Pair<'_>| {
-        let after = Shape::of(loaded, body, Some((x, y))).change();
-        after.is_some_and(|after| after < SAME.0.min(SAME.1 * before))
-    };
-    let [first, second] = bodies;
-    let pairs = first
-        .iter()
-        .flat_map(|x| second.iter().map(move |y| (x, y)));
-    let mut right = pairs.filter(|(x, y)| rigid(first, a, (x, y)) && rigid(second, b, (y, x)));
-    let pair = right.next().filter(|_| right.next().is_none())?;
-    Some((pair, a.max(b)))
+    Some(((x, y), largest))
 }
 
 /// By how much distances differ from those of these shapes, m, where both bodies have their shape with this pair exchanged and not as they are.
@@ -115,7 +114,7 @@ fn exchange(loaded: &mut Loaded, (x, y): Pair<'_>, change: f64) -> Finding {
         .with("change", Fact::meters(change))
 }
 
-/// Median and median deviation, m, of the distances between the markers of a body, by their places in the list.
+/// Median and median deviation, m, of the distances of the markers of a body from three of them, by their places in the list.
 struct Shape(BTreeMap<(usize, usize), (f64, f64)>);
 
 impl Shape {
@@ -128,11 +127,13 @@ impl Shape {
             };
             loaded.poses.markers.get(name).map_or(&[], Vec::as_slice)
         };
-        let tracks: Vec<_> = body.iter().map(track).collect();
+        let rows = loaded.poses.len();
+        let step = rows.div_ceil(ROWS).max(1);
         let mut shape = BTreeMap::new();
-        for (i, a) in tracks.iter().enumerate() {
-            for (j, b) in tracks.iter().enumerate().skip(i + 1) {
-                let seen = a.iter().zip(*b);
+        for from in [0, body.len() / 2, body.len() - 1] {
+            for to in (0..body.len()).filter(|to| *to != from) {
+                let (a, b) = (track(&body[from]), track(&body[to]));
+                let seen = a.iter().zip(b).step_by(step);
                 let distances = seen.filter_map(|(a, b)| Some((a.as_ref()? - b.as_ref()?).norm()));
                 let mut distances: Vec<f64> = distances.collect();
                 if distances.len() < ENOUGH {
@@ -142,7 +143,7 @@ impl Shape {
                     continue;
                 };
                 let mut off: Vec<f64> = distances.iter().map(|d| (d - middle).abs()).collect();
-                shape.insert((i, j), (middle, upper_median(&mut off).unwrap_or(0.0)));
+                shape.insert((to, from), (middle, upper_median(&mut off).unwrap_or(0.0)));
             }
         }
         Self(shape)
@@ -151,6 +152,18 @@ impl Shape {
     /// The largest change; `None` where nothing is seen often enough.
     fn change(&self) -> Option<f64> {
         self.0.values().map(|(_, change)| *change).reduce(f64::max)
+    }
+
+    /// The only marker of which all distances change.
+    fn moving(&self) -> Option<usize> {
+        let mut least: BTreeMap<usize, f64> = BTreeMap::new();
+        for (&(marker, _), &(_, change)) in &self.0 {
+            let own = least.entry(marker).or_insert(f64::INFINITY);
+            *own = own.min(change);
+        }
+        let mut moving = least.into_iter().filter(|(_, change)| *change > ANOTHER);
+        let (marker, _) = moving.next()?;
+        moving.next().is_none().then_some(marker)
     }
 
     /// The largest difference from another shape; `None` where they have no distance in common.
