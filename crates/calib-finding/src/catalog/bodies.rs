@@ -45,7 +45,7 @@ super::topic! {
     }
     /// Exchanged labels that were corrected.
     MARKER_SWAP_REPAIRED = "marker-swap-repaired" {
-        "": Warning,
+        "rows": Warning,
             "{rows:row} had exchanged labels, corrected by the distances between the markers: {exchanges}.",
             "Place the markers at clearly different distances before the next recording. This recording needs nothing.";
         "between_bodies": Warning,

@@ -133,13 +133,11 @@ fn finding(recording: &str, body: &str, rows: &[(u64, String)]) -> Finding {
         1 => format!("{which} in 1 row"),
         count => format!("{which} in {count} rows"),
     });
-    Finding::new(
-        catalog::MARKER_SWAP_REPAIRED,
-        Subject::body(body).in_recording(recording),
-    )
-    .with("rows", Fact::count(rows.len()))
-    .with("exchanges", Fact::names(exchanges))
-    .at_rows(rows.iter().map(|(row, _)| *row))
+    let subject = Subject::body(body).in_recording(recording);
+    Finding::of_kind(catalog::MARKER_SWAP_REPAIRED, "rows", subject)
+        .with("rows", Fact::count(rows.len()))
+        .with("exchanges", Fact::names(exchanges))
+        .at_rows(rows.iter().map(|(row, _)| *row))
 }
 
 /// Largest deviation of a distance that noise explains, m; `None` where no pair is seen often enough.
