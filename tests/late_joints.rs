@@ -20,6 +20,11 @@ const HELD_OUT: &str = "checks: {file: ripley/checks.csv, use: validation}";
 /// Rows of a motion at 0.4 rad/s for 30 s, ten a second, whose joint values are older than the markers by what `late` says of the joint, s: the first 20 s
 /// and the rest.
 fn motion(late: impl Fn(&str) -> f64) -> [String; 2] {
+    motion_of(|_| true, late)
+}
+
+/// The same where only some joints move; the others stand in the middle of their range.
+fn motion_of(moves: impl Fn(&str) -> bool, late: impl Fn(&str) -> f64) -> [String; 2] {
     let robot = load_robot(&root().join(PROFILE)).expect("shipped");
     let ranges: [(&str, f64, f64); 5] = [
         ("waist", -70.0, 170.0),
@@ -34,6 +39,11 @@ fn motion(late: impl Fn(&str) -> f64) -> [String; 2] {
             .into_iter()
             .map(|(joint, low, high)| {
                 let id = robot.model.joint_id(joint).expect("of the robot");
+                let middle = 0.5 * (low + high);
+                let (low, high) = match moves(joint) {
+                    true => (low, high),
+                    false => (middle - 0.01, middle + 0.01),
+                };
                 (id, (low.to_radians(), high.to_radians()))
             })
             .collect(),
@@ -155,6 +165,57 @@ fn a_joint_whose_values_are_late_is_named_with_its_time_and_stating_it_mends_the
     }
 }
 
+/// What the profile states is a part of what it has to state.
+#[test]
+fn a_time_that_is_stated_too_small_is_completed() {
+    if !skipped_tests::thorough() {
+        return;
+    }
+    let of = |name: &str| if name == "elbow" { 0.03 } else { 0.0 };
+    let (_, report) = run(&continuous(of, Some(("elbow", 10.0))));
+    let (named, ms) = told(&report).expect("named");
+    assert_eq!(named, "elbow");
+    assert!((ms - 30.0).abs() < 2.0, "{ms}");
+}
+
+/// In a sweep of one joint the offset of all joints is that of this one: beside the other sweeps it shows.
+#[test]
+fn a_late_joint_that_moves_alone_in_its_sweep_is_named() {
+    if !skipped_tests::thorough() {
+        return;
+    }
+    let only = |joint: &'static str| move |name: &str| name == joint;
+    let late = |name: &str| if name == "elbow" { 0.03 } else { 0.0 };
+    let swept = |late_ms: &str| {
+        let timing = format!("timing: {{poses: continuous{late_ms}}}");
+        let mut dir = Scratch::new().brief("ripley");
+        let mut specs = format!("  {SPEC}\n");
+        for joint in ["waist", "shoulder", "elbow", "wrist_pitch", "wrist_roll"] {
+            let [rows, _] = motion_of(only(joint), late);
+            dir = dir.file(&format!("robots/ripley/{joint}.csv"), rows);
+            specs +=
+                &format!("  {joint}_sweep: {{file: ripley/{joint}.csv, use: static, {timing}}}\n");
+        }
+        let [_, held_out] = motion(late);
+        let checks = HELD_OUT.replace('}', &format!(", {timing}}}"));
+        dir.file(CHECKS, held_out)
+            .edit(PROFILE, &format!("  {SPEC}\n"), &specs)
+            .edit(PROFILE, HELD_OUT, &checks)
+    };
+    let (_, report) = run(&swept(""));
+    let named = findings(&report, "clock-lag");
+    let facts = &named.first().expect("named")["facts"];
+    assert_eq!(facts["kind"], "sweep_behind", "{named:#?}");
+    assert_eq!(facts["joint"], "elbow");
+    let ms = 1e3 * facts["late"]["value"].as_f64().expect("s");
+    assert!((ms - 30.0).abs() < 2.0, "{ms}");
+    assert_eq!(report["verdict"], "rejected");
+    assert_eq!(report["diagnosis"]["evidence"], "clock-lag");
+    let (ran, report) = run(&swept(&format!(", late_ms: {{elbow: {ms:.1}}}")));
+    assert_eq!(ran.code, 0, "{}", ran.stdout);
+    assert!(told(&report).is_none(), "{:#}", report["findings"]);
+}
+
 #[test]
 fn a_joint_that_is_late_in_rows_without_timing_is_named() {
     if !skipped_tests::thorough() {
@@ -193,6 +254,6 @@ fn late_values_of_a_joint_that_is_not_there_are_refused() {
     let said = refused("elbow_2", 2);
     assert!(said.contains("the URDF has no joint `elbow_2`"), "{said}");
     let said = refused("wrist_roll", 3);
-    let expected = "joint `wrist_roll` is called late, and the recording does not have it";
+    let expected = "`late_ms` names joint `wrist_roll`, which the recording does not have";
     assert!(said.contains(expected), "{said}");
 }

@@ -1,6 +1,6 @@
 //! Why a result was not accepted, as far as the facts of a report say it.
 
-use calib_finding::{Fact, Id, catalog};
+use calib_finding::{About, Fact, Id, catalog};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -144,11 +144,38 @@ const STRUCTURAL: [ReasonId; 6] = [
 
 /// An error of the data or the model.
 fn error(report: &Report) -> Option<Diagnosis> {
-    let is_error =
-        |f: &&crate::Finding| f.severity == Severity::Error && f.id != catalog::MISSING_PHYSICS;
+    let is_error = |f: &&crate::Finding| {
+        f.severity == Severity::Error
+            && f.id != catalog::MISSING_PHYSICS
+            && !is_left_by_change(report, f)
+    };
     let finding = report.findings.iter().find(is_error)?;
     Some(Diagnosis::StructuralFault {
         evidence: finding.id.as_str().to_owned(),
+    })
+}
+
+/// Whether held-out recordings differ by what changed while the fitted ones were recorded: the fit is of neither state of it.
+fn is_left_by_change(report: &Report, error: &crate::Finding) -> bool {
+    let held_out = [
+        catalog::TRACKER_MOVED,
+        catalog::BODY_REMOUNTED,
+        catalog::JOINT_ZERO_CHANGED,
+    ];
+    let is_held_out = error.id == catalog::JOINT_ZERO_CHANGED
+        || error.facts.get("kind").and_then(Fact::word) == Some("held_out");
+    if !held_out.contains(&error.id) || !is_held_out {
+        return false;
+    }
+    let explains = |about: &About| match (about, error.facts.get("joints")) {
+        (About::Joint(joint), Some(Fact::Names(joints))) => joints.contains(joint),
+        _ => false,
+    };
+    let mut findings = report.findings.iter();
+    findings.any(|f| {
+        let about = &f.subject.about;
+        f.id == catalog::CHANGED_WHILE_RECORDING
+            && (*about == error.subject.about || explains(about))
     })
 }
 
@@ -298,4 +325,56 @@ fn undecided(report: &Report) -> Option<Diagnosis> {
         postures: None,
         fitted: false,
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use calib_finding::{Finding, Subject};
+
+    /// The diagnosis of a rejected report with these findings.
+    fn of(findings: Vec<Finding>) -> Option<Diagnosis> {
+        Diagnosis::of(&Report {
+            verdict: Verdict::Rejected,
+            findings,
+            ..Report::default()
+        })
+    }
+
+    fn slip() -> Finding {
+        let subject = Subject::joint("elbow").in_recording("poses");
+        Finding::of_kind(catalog::CHANGED_WHILE_RECORDING, "joint", subject)
+    }
+
+    fn named(evidence: Id) -> Option<Diagnosis> {
+        let evidence = evidence.as_str().to_owned();
+        Some(Diagnosis::NamedCause { evidence })
+    }
+
+    fn fault(evidence: Id) -> Option<Diagnosis> {
+        let evidence = evidence.as_str().to_owned();
+        Some(Diagnosis::StructuralFault { evidence })
+    }
+
+    #[test]
+    fn a_slip_comes_before_what_it_leaves_in_the_validation() {
+        let moved = |joints: &[&str]| {
+            Finding::of_kind(catalog::TRACKER_MOVED, "held_out", About::Tracker)
+                .with("joints", Fact::names(joints.iter().copied()))
+        };
+        let zero = |joint: &str| Finding::new(catalog::JOINT_ZERO_CHANGED, Subject::joint(joint));
+        let slipped = named(catalog::CHANGED_WHILE_RECORDING);
+        assert_eq!(of(vec![moved(&["waist", "elbow"]), slip()]), slipped);
+        assert_eq!(of(vec![zero("elbow"), slip()]), slipped);
+        // What the slip does not explain is another fault.
+        let tracker = fault(catalog::TRACKER_MOVED);
+        assert_eq!(of(vec![moved(&["waist"]), slip()]), tracker);
+        assert_eq!(of(vec![moved(&["elbow"])]), tracker);
+        let other = fault(catalog::JOINT_ZERO_CHANGED);
+        assert_eq!(of(vec![zero("waist"), slip()]), other);
+        // Of the fitted recordings themselves it is no consequence.
+        let fitted = Finding::of_kind(catalog::TRACKER_MOVED, "moved", About::Tracker)
+            .with("joints", Fact::names(["elbow"]));
+        assert_eq!(of(vec![fitted, slip()]), tracker);
+    }
 }

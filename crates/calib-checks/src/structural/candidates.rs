@@ -231,9 +231,8 @@ pub(crate) fn of_still(data: &Data) -> Vec<Candidate> {
         .collect()
 }
 
-/// Axes of joints along other coordinates than the model has them: a URDF has `1 0 0` where none is written. What is reversed is the joint's sign, but of a joint
-/// that follows another one, whose multiplier may have the other sign. An
-/// axis between coordinates was written with care.
+/// Axes of joints along other coordinates than the model has them: a URDF has `1 0 0` where none is written. A reversed axis is the sign of the joint; only
+/// of a joint that follows another one, which has no sign of its own, it is the multiplier. An axis between coordinates was written with care.
 pub(crate) fn of_axes(data: &Data) -> Vec<Candidate> {
     /// A cosine from which on a direction is that of a coordinate axis.
     const ALONG: f64 = 1.0 - 1e-6;
@@ -246,7 +245,6 @@ pub(crate) fn of_axes(data: &Data) -> Vec<Candidate> {
             .law
             .iter()
             .any(|(source, _)| span(data, *source) > MOVES);
-        // A joint that follows another one has no sign of its own.
         let follows = own.law.iter().all(|(source, _)| *source != joint);
         match own.motion {
             Motion::Revolute(axis) | Motion::Prismatic(axis) if moves => {

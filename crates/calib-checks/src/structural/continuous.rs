@@ -104,14 +104,16 @@ pub(crate) fn continuous(
 
 /// Whether two are the same fault, of whatever size.
 fn same(a: &Hypothesis, b: &Hypothesis) -> bool {
-    let of = |h: &Hypothesis| match *h {
-        Hypothesis::Gain { joint, .. } => Some((0, joint.0, joint.0)),
-        Hypothesis::Coupling { joint, source, .. } => Some((0, joint.0, source.0)),
-        Hypothesis::Lag { recording, .. } => Some((1, recording.0, 0)),
-        Hypothesis::Latency { joint, .. } => Some((2, joint.0, 0)),
-        _ => None,
+    let sizeless = |h: &Hypothesis| {
+        let mut h = *h;
+        match &mut h {
+            Hypothesis::Gain { factor, .. } | Hypothesis::Coupling { factor, .. } => *factor = 0.0,
+            Hypothesis::Lag { seconds, .. } | Hypothesis::Latency { seconds, .. } => *seconds = 0.0,
+            _ => {}
+        }
+        h
     };
-    of(a) == of(b)
+    sizeless(a) == sizeless(b)
 }
 
 /// The fault that is demanded without these samples, and without those that are outliers beside it.

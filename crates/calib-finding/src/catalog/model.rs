@@ -112,11 +112,17 @@ super::topic! {
             "The joint values of {recording:code} are {offset} ± {sigma} ahead of the tracker's data of their rows: that changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
             "Let the fit estimate it: `timing: {poses: continuous, clock: estimate}` in {recording:code} and in the recordings made in the same way. Or record in holds.";
         "joint_behind": Warning,
-            "The values of joint `{joint}` in {recordings:code} lag {offset} ± {sigma} behind those of the other joints and the tracker's data of their rows: that changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
-            "Write the values of this joint into the log at the time at which they were measured. Or let them be moved, in {recordings:code} and in the recordings made in the same way: `timing: {poses: continuous, late_ms: {{joint}: {late:yaml-ms}}}`. Or record in holds.";
+            "The values of joint `{joint}` in {recordings:code} lag {offset} ± {sigma} behind those of the other joints and the tracker's data of their rows[[, beyond the {stated} that the profile states]]: that changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
+            "State by how much they are late, in {recordings:code} and in the recordings made in the same way: `timing: {poses: continuous, late_ms: {{joint}: {late:yaml-ms}}}`. Or write them into the log with the time at which they were measured, or record in holds.";
         "joint_ahead": Warning,
-            "The values of joint `{joint}` in {recordings:code} are {offset} ± {sigma} ahead of those of the other joints and of the tracker's data of their rows: that changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
-            "Write the values of this joint into the log at the time at which they were measured. Or let them be moved, in {recordings:code} and in the recordings made in the same way: `timing: {poses: continuous, late_ms: {{joint}: {late:yaml-ms}}}`. Or record in holds.";
+            "The values of joint `{joint}` in {recordings:code} are {offset} ± {sigma} ahead of those of the other joints and of the tracker's data of their rows[[, beyond the {stated} that the profile states]]: that changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
+            "State by how much they are late, in {recordings:code} and in the recordings made in the same way: `timing: {poses: continuous, late_ms: {{joint}: {late:yaml-ms}}}`. Or write them into the log with the time at which they were measured, or record in holds.";
+        "sweep_behind": Warning,
+            "In {recording:code} joint `{joint}` alone moves, and its values lag {offset} ± {sigma} further behind the tracker's data than the joint values of the other recordings[[, beyond the {stated} that the profile states]]. There this was corrected; where other joints move as well, one offset of all joints does not correct it.",
+            "If this recording was not logged otherwise than the others, state by how much the values of this joint are late, in {recordings:code}: `timing: {poses: continuous, late_ms: {{joint}: {late:yaml-ms}}}`. Or record in holds.";
+        "sweep_ahead": Warning,
+            "In {recording:code} joint `{joint}` alone moves, and its values are {offset} ± {sigma} further ahead of the tracker's data than the joint values of the other recordings[[, beyond the {stated} that the profile states]]. There this was corrected; where other joints move as well, one offset of all joints does not correct it.",
+            "If this recording was not logged otherwise than the others, state by how much the values of this joint are late, in {recordings:code}: `timing: {poses: continuous, late_ms: {{joint}: {late:yaml-ms}}}`. Or record in holds.";
         "corrected_behind": Warning,
             "The joint values of {recording:code} lag {offset} ± {sigma} behind the tracker's data of their rows. This was estimated from the motion and corrected.",
             "Correct the times of the joint values if you can. The offset is taken into account.";

@@ -89,7 +89,7 @@ super::topic! {
             "Let the fit estimate it: `timing: {poses: continuous, clock: estimate}` in {recording:code} and in the recordings made in the same way. Or record in holds.";
         "latency": Warning,
             "{physics} (`{parameter}`): explains {explains:percent} of χ², p = {p_value}.[[ Nearly as good: {alternatives:code}.]]",
-            "Write the values of this joint into the log at the time at which they were measured. Or let them be moved, in {recordings:code} and in the recordings made in the same way: `timing: {poses: continuous, late_ms: {{joint}: {late:yaml-ms}}}`. Or record in holds.";
+            "State by how much they are late, in {recordings:code} and in the recordings made in the same way: `timing: {poses: continuous, late_ms: {{joint}: {late:yaml-ms}}}`. Or write them into the log with the time at which they were measured, or record in holds.";
     }
     /// From which side a joint came is not recorded before its first motion.
     SIDE_BY_RESIDUALS = "side-by-residuals" {

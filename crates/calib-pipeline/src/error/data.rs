@@ -54,8 +54,8 @@ pub enum DataProblem {
         /// The joint.
         joint: String,
     },
-    /// Values that are called late and are not there.
-    #[error("joint `{joint}` is called late, and the recording does not have it")]
+    /// A joint in `late_ms` that is not recorded.
+    #[error("`late_ms` names joint `{joint}`, which the recording does not have")]
     LateJointNotRecorded {
         /// The joint.
         joint: String,

@@ -9,7 +9,7 @@
 //!
 //! so one c₀ and one c₁ are shared by all joints of a recording ([`calib_core::EffectKind::ClockOffset`]).
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 use calib_checks::sync::ClockMap;
 use calib_core::{EffectKind, Parameter, ParameterId, ParameterKind, Problem, Unit};
@@ -18,6 +18,7 @@ use calib_profile::Usage;
 use calib_report::{Clock, ClockCheck, number};
 
 use crate::formulate::formulation::{ClockParameters, Formulation, FreeSet, MlFit};
+use crate::formulate::late;
 use crate::prepare::aligned::{Alignment, ClockState, ClockUnknowns, SAME_TIME};
 use crate::prepare::inputs::{Inputs, Loaded};
 
@@ -98,36 +99,7 @@ pub fn add_clocks(formulation: &mut Formulation, inputs: &Inputs, free_set: Free
             }
         }
     }
-    add_latencies(formulation, inputs);
-}
-
-/// Offers the latency of every joint to the test for missing physics; where one joint alone moves it is the offset of the clock.
-fn add_latencies(formulation: &mut Formulation, inputs: &Inputs) {
-    let timed = |name: &str| inputs.recordings.get(name).map(|loaded| &loaded.velocities);
-    let moves = |speed: &Option<f64>| speed.is_some_and(|speed| speed != 0.0);
-    let fitted = || {
-        let all = inputs.recordings.values();
-        all.filter(|loaded| loaded.spec.usage != Usage::Validation)
-    };
-    let moving: BTreeSet<&String> = fitted()
-        .flat_map(|loaded| &loaded.velocities)
-        .filter(|(_, speeds)| speeds.iter().any(moves))
-        .map(|(joint, _)| joint)
-        .collect();
-    for joint in moving.iter().filter(|_| moving.len() > 1) {
-        let id = inputs.robot.model.joint_id(joint).ok();
-        let Some(edge) = id.and_then(|id| formulation.joints[id.index()]) else {
-            continue;
-        };
-        let speed = |(recording, row): &(String, usize)| -> f64 {
-            let speeds = timed(recording).and_then(|of| of.get(*joint));
-            let speed = speeds.and_then(|speeds| speeds.get(*row).copied().flatten());
-            speed.unwrap_or(0.0)
-        };
-        let speeds: Vec<f64> = formulation.samples.iter().map(speed).collect();
-        let problem = &mut formulation.problem;
-        problem.candidate(edge, EffectKind::Latency, speeds);
-    }
+    late::add_latencies(formulation, inputs);
 }
 
 /// c₀ of a recording, and c₁ where the clocks are two.
@@ -211,6 +183,22 @@ pub fn clock_estimate(loaded: &Loaded, fit: Option<&MlFit>) -> Option<ClockEstim
 /// What the fit says of the clocks, in place of what was noticed before it: the numbers of an offset, and joint values that
 /// were read late.
 pub fn noticed(findings: &mut Vec<Finding>, inputs: &Inputs, fit: &MlFit) {
+    let fitted = inputs.recordings.values();
+    let fitted = fitted.filter(|r| r.spec.usage != Usage::Validation);
+    // Late joint values show the tracker's event later on the robot's clock.
+    let lags: BTreeMap<&str, (f64, f64)> = fitted
+        .filter(|r| r.alignment.as_ref().map(Alignment::unknowns) == Some(ClockUnknowns::Offset))
+        .filter_map(|r| {
+            let clock = clock_estimate(r, Some(fit))?;
+            Some((r.name.as_str(), (-clock.offset, clock.sigma?)))
+        })
+        .collect();
+    let of_one_joint: BTreeMap<&String, Finding> = inputs
+        .recordings
+        .keys()
+        .filter_map(|name| Some((name, late::of_one_joint(inputs, &lags, name)?)))
+        .collect();
+    findings.extend(of_one_joint.values().cloned());
     for loaded in inputs.recordings.values() {
         let Some(alignment) = &loaded.alignment else {
             continue;
@@ -218,6 +206,9 @@ pub fn noticed(findings: &mut Vec<Finding>, inputs: &Inputs, fit: &MlFit) {
         let Some(clock) = clock_estimate(loaded, Some(fit)) else {
             continue;
         };
+        if of_one_joint.contains_key(&loaded.name) {
+            continue;
+        }
         let sigma = clock.sigma.unwrap_or_default();
         if alignment.unknowns() == ClockUnknowns::OffsetAndDrift {
             let own = findings.iter_mut().filter(|f| {
@@ -233,7 +224,6 @@ pub fn noticed(findings: &mut Vec<Finding>, inputs: &Inputs, fit: &MlFit) {
         } else if alignment.unknowns() == ClockUnknowns::Offset
             && clock.offset.abs() > SAME_TIME.max(4.0 * sigma)
         {
-            // Late joint values show the tracker's event later on the robot's clock.
             let kind = match clock.offset < 0.0 {
                 true => "corrected_behind",
                 false => "corrected_ahead",

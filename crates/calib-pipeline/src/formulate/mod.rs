@@ -16,6 +16,7 @@ pub(crate) mod from_origins;
 pub(crate) mod gear_ratio;
 pub(crate) mod held;
 pub mod kinematics;
+pub(crate) mod late;
 pub(crate) mod memory;
 pub mod ml;
 pub mod model_checks;

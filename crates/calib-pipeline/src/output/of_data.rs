@@ -12,6 +12,7 @@ use calib_report::{
 };
 
 use crate::formulate::formulation::MlFit;
+use crate::formulate::late::with_late_joint;
 use crate::output::counts::{Tracks, count, rows};
 use crate::output::evidence::Evidence;
 use crate::prepare::inputs::{Inputs, Loaded};
@@ -205,10 +206,8 @@ pub(crate) fn missing_finding(e: &Evidence<'_>, missing: &MissingPhysics) -> Fin
         (Some(recording), _) => kind("clock").with("recording", Fact::name(recording)),
         (None, Some(joint)) => {
             let timed = recordings.values().filter(|r| !r.velocities.is_empty());
-            kind("latency")
-                .with("joint", Fact::name(joint))
-                .with("late", Fact::seconds(missing.estimate))
-                .with("recordings", Fact::names(timed.map(|r| r.name.as_str())))
+            let finding = kind("latency").with("recordings", Fact::names(timed.map(|r| &r.name)));
+            with_late_joint(finding, e.inputs, joint, missing.estimate)
         }
         (None, None) => kind("effect"),
     };

@@ -12,6 +12,7 @@ use calib_profile::BodyKind;
 use nalgebra::Point3;
 
 use crate::prepare::inputs::{Inputs, Loaded};
+use crate::prepare::scatter::scatter;
 
 /// Change of a distance, m, from which on a body is not the one that it is called.
 const ANOTHER: f64 = 5e-3;
@@ -31,11 +32,17 @@ pub(super) fn between_bodies(inputs: &mut Inputs) -> Vec<Finding> {
             _ => None,
         })
         .collect();
-    let mut findings = Vec::new();
+    let mut findings: Vec<Finding> = Vec::new();
     for (a, first) in bodies.iter().enumerate() {
         for second in &bodies[a + 1..] {
             let recordings = &mut inputs.recordings;
             findings.extend(of_bodies(recordings, [first, second]));
+        }
+    }
+    let robot = &inputs.robot;
+    for name in findings.iter().flat_map(|f| &f.subject.recordings) {
+        if let Some(loaded) = inputs.recordings.get_mut(name) {
+            loaded.scatter = scatter(&robot.profile, &robot.model, &loaded.poses);
         }
     }
     findings
@@ -102,16 +109,20 @@ fn by_shape(
 }
 
 fn exchange(loaded: &mut Loaded, (x, y): Pair<'_>, change: f64) -> Finding {
-    let tracks = &mut loaded.poses.markers;
-    if let (Some(of_x), Some(of_y)) = (tracks.remove(x), tracks.remove(y)) {
-        tracks.insert(x.clone(), of_y);
-        tracks.insert(y.clone(), of_x);
-    }
+    exchanged(&mut loaded.poses.markers, (x, y));
+    exchanged(&mut loaded.shapes, (x, y));
     let subject = Subject::default().in_recording(&loaded.name);
     Finding::of_kind(catalog::MARKER_SWAP_REPAIRED, "between_bodies", subject)
         .with("first", Fact::name(x))
         .with("second", Fact::name(y))
         .with("change", Fact::meters(change))
+}
+
+/// Exchanges what is known of two markers.
+fn exchanged<T>(of_markers: &mut BTreeMap<String, T>, (x, y): Pair<'_>) {
+    let (of_x, of_y) = (of_markers.remove(x), of_markers.remove(y));
+    of_markers.extend(of_y.map(|of_y| (x.clone(), of_y)));
+    of_markers.extend(of_x.map(|of_x| (y.clone(), of_x)));
 }
 
 /// Median and median deviation, m, of the distances of the markers of a body from three of them, by their places in the list.

@@ -9,6 +9,7 @@ use calib_finding::{About, Fact, Finding, Subject, Unit, catalog};
 
 use super::codes;
 use super::layout::Layout;
+use crate::formulate::late::with_late_joint;
 use crate::prepare::aligned::ClockUnknowns;
 
 /// Findings beside the decision.
@@ -167,11 +168,10 @@ fn continuous_finding(layout: &Layout<'_>, found: &Continuous) -> Option<Finding
                 .filter(|(_, rates)| rates.is_some())
                 .map(|(recording, _)| layout.recordings[recording.0].name.as_str())
                 .collect();
-            Finding::of_kind(catalog::CLOCK_LAG, kind, Subject::joint(name))
-                .with("joint", Fact::name(name))
+            let finding = Finding::of_kind(catalog::CLOCK_LAG, kind, Subject::joint(name))
                 .with("offset", Fact::seconds(seconds.abs()))
-                .with("late", Fact::seconds(seconds))
-                .with("recordings", Fact::names(timed))
+                .with("recordings", Fact::names(timed));
+            with_late_joint(finding, layout.inputs, name, seconds)
         }
         _ => return None,
     };
