@@ -47,6 +47,7 @@ mod record;
 mod record_plan;
 mod redefined;
 mod renamed;
+mod robot_sizes;
 mod robots;
 mod scratch;
 mod screens;

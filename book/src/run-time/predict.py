@@ -1,8 +1,11 @@
 #!/usr/bin/env python3
-"""Predicts body poses from `<robot>.calibrated.model.json`, without any package.
+"""Predicts bodies and markers from `<robot>.calibrated.model.json`, without any package.
 
-    predict.py MODEL.json TABLE.csv      compares with a table of 6-DoF bodies: rms distance in mm
-    predict.py MODEL.json joint=deg …    prints where the bodies are, m in the tracker's frame
+    predict.py MODEL.json TABLE.csv      compares with a table of calib's CSV: rms distance in mm
+    predict.py MODEL.json joint=deg …    prints where bodies and markers are, m in the tracker's frame
+
+The table has a column for each joint (`elbow_deg`) and three for each marker or 6-DoF body (`grip_1.x_m` …), named as
+in the profile. An argument of a sliding joint is in m.
 
 The equations are those at the top of crates/calib-model/src/file.rs. Joints are taken in the middle of their backlash, and
 links at the reference temperature unless `temperature_c` (an argument, or a column) says how warm the robot is.
@@ -115,37 +118,76 @@ def links(model, q):
     return walk(loads)
 
 
-def bodies(model, q):
-    """tracker_from_body of every body."""
-    at, base = links(model, q), pose(model["tracker_from_root"])
-    return {name: compose(compose(base, at[b["link"]]), pose(b["link_from_body"]))
-            for name, b in model["bodies"].items() if b["link_from_body"]}
+def places(model, q):
+    """Origins of all bodies, then all markers, by the name of their columns; m in the tracker's frame."""
+    at, base, found = links(model, q), pose(model["tracker_from_root"]), {}
+    for name, b in model["bodies"].items():
+        link = compose(base, at[b["link"]])
+        if b["link_from_body"]:
+            found[name] = compose(link, pose(b["link_from_body"]))[0]
+        for marker, p in b["markers_m"].items():
+            found[marker] = add(link[0], turn(link[1], p))
+    return found
 
 
-def joints_of(row):
-    """Columns `joint_deg` in rad, and how warm it is."""
-    q = {k[:-4]: math.radians(float(v)) for k, v in row.items() if k.endswith("_deg")}
-    return q | {k: float(row[k]) for k in ["temperature_c"] if row.get(k)}
+ANGLES = {"_deg": math.radians(1), "_rad": 1.0}
+LENGTHS = {"_m": 1.0, "_cm": 1e-2, "_mm": 1e-3}
+
+
+def number(row, name, units):
+    """A cell in rad or m; None where there is no such column, or no number in it."""
+    for unit, one in units.items():
+        cell = (row.get(name + unit) or "").strip()
+        if cell and not math.isnan(float(cell)):
+            return one * float(cell)
+
+
+def joints_of(model, row):
+    """Joint positions in rad or m, and how warm the robot is."""
+    moving = {j["name"]: LENGTHS if j["motion"] == "prismatic" else ANGLES
+              for j in model["joints"] if j.get("axis") and not j.get("mimic")}
+    q = {name: number(row, name, units) for name, units in moving.items()}
+    return q | {"temperature_c": number(row, "temperature_c", {"": 1.0})}
+
+
+def compare(model, table):
+    with open(table, encoding="utf-8") as file:
+        rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
+    rows = [{(k or "").removeprefix("joint:"): v for k, v in row.items()} for row in rows]
+    squares, absent = [], set()
+    for row in rows:
+        q = joints_of(model, row)
+        absent |= {k for k, v in q.items() if v is None and k != "temperature_c"}
+        for name, at in places(model, {k: v for k, v in q.items() if v is not None}).items():
+            seen = [number(row, f"{name}.{a}", LENGTHS) for a in "xyz"]
+            if None not in seen and any(seen):      # a lost marker is empty, NaN or at 0, 0, 0
+                off = sub(at, seen)
+                squares.append(dot(off, off))
+    if not squares or absent == q.keys() - {"temperature_c"}:
+        what = "joint of the model" if squares else "body or marker of the model, such as " + list(places(model, {}))[-1]
+        sys.exit(f"{table}: no values of a {what}. The columns must be those of calib's CSV; `calib convert` writes it.")
+    if absent:
+        print("taken at 0 where there is no value:", ", ".join(sorted(absent)), file=sys.stderr)
+    print(f"{len(squares)} positions, rms {1e3 * math.sqrt(sum(squares) / len(squares)):.2f} mm")
 
 
 def main(model_file, *rest):
-    model = json.load(open(model_file))
-    if rest[0].endswith(".csv"):
-        lines = (line for line in open(rest[0]) if not line.startswith("#"))
-        squares = []
-        for row in csv.DictReader(lines):
-            for name, (at, _) in bodies(model, joints_of(row)).items():
-                seen = [row[f"{name}.{a}_m"] for a in "xyz"]
-                if all(seen):
-                    off = sub(at, [float(v) for v in seen])
-                    squares.append(dot(off, off))
-        print(f"{len(squares)} positions, rms {1e3 * math.sqrt(sum(squares) / len(squares)):.2f} mm")
-    else:
-        pairs = dict(pair.split("=") for pair in rest)
-        q = joints_of({k if k == "temperature_c" else f"{k}_deg": v for k, v in pairs.items()})
-        for name, (at, _) in bodies(model, q).items():
-            print(name, " ".join(f"{v:.5f}" for v in at))
+    with open(model_file, encoding="utf-8") as file:
+        model = json.load(file)
+    if model.get("calib_model") != 1:
+        sys.exit(f"{model_file}: not a model file of version 1")
+    if len(rest) == 1 and "=" not in rest[0]:
+        return compare(model, rest[0])
+    given = {name: float(value) for name, value in (pair.split("=") for pair in rest)}
+    angles = {j["name"] for j in model["joints"] if j["motion"] == "revolute"}
+    unknown = given.keys() - {j["name"] for j in model["joints"]} - {"temperature_c"}
+    if unknown:
+        sys.exit(f"not a joint of this robot: {', '.join(sorted(unknown))}")
+    for name, at in places(model, {k: math.radians(v) if k in angles else v for k, v in given.items()}).items():
+        print(name, " ".join(f"{v:.5f}" for v in at))
 
 
 if __name__ == "__main__":
+    if len(sys.argv) < 3:
+        sys.exit(__doc__)
     main(*sys.argv[1:])

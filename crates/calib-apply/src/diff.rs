@@ -6,7 +6,7 @@ use calib_urdf::source;
 
 use crate::error::ApplyError;
 use crate::kind::Kind;
-use crate::target::origins;
+use crate::target::{Origins, origins};
 
 fn text(path: &Path) -> Result<String, ApplyError> {
     Ok(source::read_text(path, &path.display().to_string())?)
@@ -15,7 +15,7 @@ fn text(path: &Path) -> Result<String, ApplyError> {
 /// The difference of two robots as a table: URDFs, xacros, kinematics YAMLs, or one of each.
 ///
 /// # Errors
-/// [`ApplyError::Read`] with file and place.
+/// [`ApplyError::Read`] with file and place, [`ApplyError::NoOrigins`] for a YAML that is about something else.
 pub fn diff_table(a: &Path, b: &Path) -> Result<String, ApplyError> {
     Ok(format!("{}\n", model_diff(a, b)?).trim_end().to_owned() + "\n")
 }
@@ -23,7 +23,7 @@ pub fn diff_table(a: &Path, b: &Path) -> Result<String, ApplyError> {
 /// The difference of two robots as JSON.
 ///
 /// # Errors
-/// [`ApplyError::Read`] with file and place.
+/// As [`diff_table`].
 pub fn diff_json(a: &Path, b: &Path) -> Result<String, ApplyError> {
     Ok(calib_report::json::exact_json(&model_diff(a, b)?)?)
 }
@@ -41,8 +41,24 @@ pub fn diff_unified(a: &Path, b: &Path) -> Result<String, ApplyError> {
     ))
 }
 
+/// The origins of a file; a YAML must have some, or all joints would seem to be removed.
+fn compared(path: &Path) -> Result<Origins, ApplyError> {
+    let found = origins(path)?;
+    if found.kind != Kind::Yaml {
+        return Ok(found);
+    }
+    let is_profile = text(path)?.lines().any(|line| line.starts_with("calib:"));
+    if is_profile || found.found.is_empty() {
+        return Err(ApplyError::NoOrigins {
+            path: path.to_path_buf(),
+            is_profile,
+        });
+    }
+    Ok(found)
+}
+
 fn model_diff(a: &Path, b: &Path) -> Result<calib_urdf::ModelDiff, ApplyError> {
-    let (of_a, of_b) = (origins(a)?, origins(b)?);
+    let (of_a, of_b) = (compared(a)?, compared(b)?);
     if (of_a.kind, of_b.kind) == (Kind::Urdf, Kind::Urdf) {
         return Ok(calib_urdf::diff(
             &text(a)?,
@@ -82,4 +98,27 @@ fn model_diff(a: &Path, b: &Path) -> Result<calib_urdf::ModelDiff, ApplyError> {
 
 fn same_joint(a: &str, b: &str) -> bool {
     a == b || calib_urdf::ur_key(a) == Some(b) || calib_urdf::ur_key(b) == Some(a)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_profile_is_no_robot() {
+        let robots = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../robots");
+        let (urdf, profile) = (robots.join("ripley/r17.urdf"), robots.join("ripley.yaml"));
+        for (a, b) in [(&urdf, &profile), (&profile, &urdf)] {
+            let refused = diff_table(a, b).expect_err("a profile");
+            let said = refused.to_string();
+            let start = format!("{}: this YAML holds no origins", profile.display());
+            assert!(said.starts_with(&start), "{said}");
+            assert!(
+                said.contains("it is a profile of calib\n  help: "),
+                "{said}"
+            );
+            assert_eq!(refused.path(), Some(profile.as_path()));
+        }
+        assert!(diff_table(&urdf, &urdf).is_ok());
+    }
 }

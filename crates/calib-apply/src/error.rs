@@ -34,6 +34,19 @@ pub enum ApplyError {
         /// The path.
         path: PathBuf,
     },
+    /// A YAML without origins of joints was to be compared.
+    #[error(
+        "{}: this YAML holds no origins of joints{}\n  help: give a URDF, a xacro, or a YAML of origins like `kinematics_params`{}",
+        path.display(),
+        if *is_profile { ": it is a profile of calib" } else { "" },
+        if *is_profile { "; the robot of a profile is the file at `robot.urdf`" } else { "" }
+    )]
+    NoOrigins {
+        /// The file.
+        path: PathBuf,
+        /// Whether it is a profile of calib.
+        is_profile: bool,
+    },
     /// The report lists no calibrated URDF.
     #[error("{}: this report names no calibrated URDF\n  help: run the calibration again", report.display())]
     NoUrdf {
@@ -202,6 +215,7 @@ impl ApplyError {
             Self::Report(error) => Some(error.path()),
             Self::File(error) => error.path(),
             Self::NoResult { path }
+            | Self::NoOrigins { path, .. }
             | Self::NotAccepted { path, .. }
             | Self::NoRecord { path, .. }
             | Self::NotARecord { path, .. } => Some(path),

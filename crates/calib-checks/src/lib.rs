@@ -35,4 +35,4 @@ mod statistics;
 pub mod structural;
 pub mod sync;
 
-pub use recording::{Expectations, checks, held_out_in_training, other_shapes};
+pub use recording::{Expectations, checks, held_out_in_training, other_scales, other_shapes};

@@ -58,7 +58,7 @@ pub fn text(drift: &Drift) -> String {
         .filter(|n| !n.significant && n.gauge_free)
         .collect();
     if drift.changed || !still.is_empty() {
-        section(&mut out, "Within its uncertainty", &still);
+        section(&mut out, &not_significant(drift), &still);
     }
     let mut list = |what: &str, names: &[String]| {
         if !names.is_empty() {
@@ -114,22 +114,50 @@ fn section(out: &mut String, heading: &str, rows: &[&Changed]) {
         return;
     }
     let _ = writeln!(out, "\n{heading}");
+    // The longest weight leaves less room on a line of 80.
+    let room = if rows.iter().all(|r| r.significant) {
+        48
+    } else {
+        34
+    };
     let width = rows
         .iter()
         .map(|r| r.text.chars().count())
         .max()
         .unwrap_or(0)
-        .min(48);
+        .min(room);
     for row in rows {
         let change = number::change(row.change, Some(row.sigma), row.unit);
-        let sigmas = (row.change / row.sigma).abs();
+        let weight = weight(row);
         if row.text.chars().count() > width {
             let _ = writeln!(out, "  {}", row.text);
-            let _ = writeln!(out, "  {:width$}  {change}  ({sigmas:.1} σ)", "");
+            let _ = writeln!(out, "  {:width$}  {change}  {weight}", "");
         } else {
-            let _ = writeln!(out, "  {:width$}  {change}  ({sigmas:.1} σ)", row.text);
+            let _ = writeln!(out, "  {:width$}  {change}  {weight}", row.text);
         }
     }
+}
+
+fn not_significant(drift: &Drift) -> String {
+    format!(
+        "Not significant at the level of {} % (p for the whole list, by Holm)",
+        number::fixed(50.0 * drift.false_alarms, 1)
+    )
+}
+
+/// How much a change means. Few degrees of freedom make one of many σ not significant: the reader must see that.
+fn weight(row: &Changed) -> String {
+    /// Degrees of freedom below which Student's t has far heavier tails than the normal.
+    const FEW: f64 = 10.0;
+    let sigmas = (row.change / row.sigma).abs();
+    if row.significant {
+        return format!("({sigmas:.1} σ)");
+    }
+    let few = match row.degrees_of_freedom < FEW {
+        true => format!(", {:.0} dof", row.degrees_of_freedom),
+        false => String::new(),
+    };
+    format!("({sigmas:.1} σ{few}, p {:.2})", row.p_adjusted)
 }
 
 fn probability(p: f64) -> String {

@@ -401,6 +401,45 @@ fn what_a_recording_hardly_sees_is_left_out() {
     assert!(text.contains("too far for the linear comparison"), "{text}");
 }
 
+/// Many σ of a noise that few degrees of freedom tell are not significant: the text says why, and does not call them small.
+#[test]
+fn many_sigmas_of_few_degrees_of_freedom_are_called_not_significant() {
+    let mut rng = ChaCha8Rng::seed_from_u64(79);
+    let of = |r: &Report| Evidence::of(r, "report.json").expect("a report");
+    let mut moved = SAME_ROBOT;
+    moved[3] += 6e-4;
+    let (old, mut new) = (session(&mut rng, &ROBOT), session(&mut rng, &moved));
+    if let Some(info) = &mut new.data_information {
+        info.degrees_of_freedom = 1.0;
+    }
+    let found = compare(&of(&old), &of(&new)).expect("one robot");
+    let number = (found.numbers.iter())
+        .find(|n| n.name == "elbow.z")
+        .expect("a number of both");
+    assert!(number.change / number.sigma > 5.0 && !number.significant);
+    let mut text = found.clone();
+    // As an invariant: only those are listed where they did not change.
+    text.numbers
+        .iter_mut()
+        .for_each(|n| n.gauge_free = n.name == "elbow.z");
+    let text = calib_drift::text(&text);
+    let line = text
+        .lines()
+        .find(|l| l.contains("elbow.z"))
+        .expect("a line");
+    assert!(
+        text.contains("Not significant at the level of 0.5 %"),
+        "{text}"
+    );
+    let said = format!(
+        "{:.0} dof, p {:.2})",
+        number.degrees_of_freedom, number.p_adjusted
+    );
+    assert!(line.ends_with(&said), "{line}");
+    assert!(!text.contains("Within its uncertainty"), "{text}");
+    assert!(text.lines().all(|l| l.chars().count() <= 80), "{text}");
+}
+
 /// A number that is not finite, or a root of zeros, is no panic and no NaN.
 #[test]
 fn degenerate_information_stays_finite() {

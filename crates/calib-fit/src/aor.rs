@@ -10,8 +10,12 @@ use crate::TableRequest;
 use crate::answer::{Answer, answer, contradicted, coordinates, doubt, freedom, matrix};
 use crate::comparison::{Found, Quantity};
 use crate::error::FitError;
+use crate::explained::{Unexplained, unexplained};
 use crate::road::{self, Command, Data, Road, Wish};
 use crate::table::Table;
+
+/// What explains the points.
+const WHAT: &str = "axis";
 
 fn command() -> Command<AorEstimate> {
     Command {
@@ -45,6 +49,7 @@ pub fn aor(request: &TableRequest) -> Result<Answer, FitError> {
         file: &table.file,
         data: Data::Table(&table, &tracks),
         options: &road::options(request, &table)?,
+        against: &|e| Some(against(request, &table, e)?.reason(WHAT)),
     };
     let wish = Wish {
         estimator: request.estimator.as_deref(),
@@ -68,19 +73,32 @@ fn preferred(table: &Table) -> &'static str {
     }
 }
 
+fn rejected(table: &Table, e: &AorEstimate) -> Vec<u64> {
+    let rows = e.rejected.iter();
+    rows.filter_map(|r| table.rows.get(*r).copied()).collect()
+}
+
+/// Residuals that are no noise about an axis.
+fn against(request: &TableRequest, table: &Table, e: &AorEstimate) -> Option<Unexplained> {
+    unexplained(request, table, e.rms, &rejected(table, e))
+}
+
 fn aor_answer(request: &TableRequest, table: &Table, id: &str, e: &AorEstimate) -> Answer {
-    let observable = e.verdict == Verdict::Ok;
-    let rejected: Vec<u64> = e
-        .rejected
-        .iter()
-        .filter_map(|r| table.rows.get(*r).copied())
-        .collect();
+    let against = against(request, table, e);
+    let observable = e.verdict == Verdict::Ok && against.is_none();
+    let verdict = if against.is_some() {
+        Verdict::Weak
+    } else {
+        e.verdict
+    };
+    let unexplained = against.map(|a| a.reason(WHAT));
+    let rejected = rejected(table, e);
     let frame = axis_frame(request);
     let value = json!({
         "estimator": id,
         "observable": observable,
-        "verdict": e.verdict.as_str(),
-        "reason": e.reason,
+        "verdict": verdict.as_str(),
+        "reason": unexplained.as_ref().or(e.reason.as_ref()),
         "frame": frame,
         "point_m": e.line.point.coords.as_slice(),
         "direction": e.line.direction.as_slice(),
@@ -92,7 +110,8 @@ fn aor_answer(request: &TableRequest, table: &Table, id: &str, e: &AorEstimate) 
         "rejected": rejected,
     });
     let mut text = format!(
-        "{id}: direction {} in the frame of {frame}\n",
+        "{id}:{} direction {} in the frame of {frame}\n",
+        against.map_or_else(String::new, |a| format!(" {}", a.head(WHAT))),
         coordinates(e.line.direction.as_slice())
     );
     text += &doubt(e.reason.as_deref());

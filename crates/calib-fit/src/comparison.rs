@@ -78,13 +78,16 @@ pub(crate) fn comparison(quantity: Quantity, lines: &[Line]) -> Answer {
         let distance = reference.map(|r| quantity.distance(value, &r.value));
         let combined = reference.map_or(f64::INFINITY, |r| r.sigma.hypot(*sigma));
         let agrees = distance.is_some_and(|d| d <= AGREES * combined);
+        let compared = match distance.map(|d| quantity.shown(d)) {
+            Some(off) => format!("off {off}  {}", if agrees { "agrees" } else { "DIFFERS" }),
+            // Nothing to compare with: what stands against it is the news.
+            None => format!("\n  {reason}"),
+        };
         let _ = writeln!(
             text,
-            "{id:<16} {verdict:<6} {}  sigma {}  off {}  {}",
+            "{id:<16} {verdict:<6} {}  sigma {}  {compared}",
             coordinates(value.as_slice()),
             quantity.shown(*sigma),
-            distance.map(|d| quantity.shown(d)).unwrap_or_default(),
-            if agrees { "agrees" } else { "DIFFERS" }
         );
         values.push(json!({
             "estimator": id,

@@ -10,11 +10,15 @@ use crate::TableRequest;
 use crate::answer::{Answer, answer, contradicted, coordinates, doubt, freedom, matrix};
 use crate::comparison::{Found, Quantity};
 use crate::error::FitError;
+use crate::explained::{Unexplained, unexplained};
 use crate::road::{self, Command, Data, Road, Wish};
 use crate::table::Table;
 
 /// Without a named estimator, rows that raise the residuals by more than this factor are rejected: they are not noise.
 const GROSS: f64 = 3.0;
+
+/// What explains the points.
+const WHAT: &str = "center";
 
 fn command() -> Command<CorEstimate> {
     Command {
@@ -48,13 +52,14 @@ pub fn cor(request: &TableRequest) -> Result<Answer, FitError> {
         file: &table.file,
         data: Data::Table(&table, &tracks),
         options: &road::options(request, &table)?,
+        against: &|e| Some(against(request, &table, e)?.reason(WHAT)),
     };
     let wish = Wish {
         estimator: request.estimator.as_deref(),
         all: request.all,
     };
     let preferred = |road: &Road<'_, _>| preferred(road, &table);
-    road.answer(wish, preferred, |id, e| cor_answer(&table, id, e))
+    road.answer(wish, preferred, |id, e| cor_answer(request, &table, id, e))
 }
 
 /// The estimator for a table where none was named.
@@ -79,22 +84,37 @@ fn preferred(road: &Road<'_, CorEstimate>, table: &Table) -> &'static str {
     }
 }
 
-fn cor_answer(table: &Table, id: &str, e: &CorEstimate) -> Answer {
-    let observable = e.verdict == Verdict::Ok;
-    let rejected: Vec<u64> = e
-        .rejected
-        .iter()
-        .filter_map(|r| table.rows.get(r.row).copied())
-        .collect();
+fn rejected(table: &Table, e: &CorEstimate) -> Vec<u64> {
+    let rows = e.rejected.iter();
+    rows.filter_map(|r| table.rows.get(r.row).copied())
+        .collect()
+}
+
+/// Residuals that are no noise about a center.
+fn against(request: &TableRequest, table: &Table, e: &CorEstimate) -> Option<Unexplained> {
+    unexplained(request, table, e.rms, &rejected(table, e))
+}
+
+fn cor_answer(request: &TableRequest, table: &Table, id: &str, e: &CorEstimate) -> Answer {
+    let against = against(request, table, e);
+    let observable = e.verdict == Verdict::Ok && against.is_none();
+    let verdict = if against.is_some() {
+        Verdict::Weak
+    } else {
+        e.verdict
+    };
+    let unexplained = against.map(|a| a.reason(WHAT));
+    let rejected = rejected(table, e);
     let mut value = json!({
         "estimator": id,
         "observable": observable,
-        "verdict": e.verdict.as_str(),
-        "reason": e.reason,
+        "verdict": verdict.as_str(),
+        "reason": unexplained.as_ref().or(e.reason.as_ref()),
         "center_m": e.center.coords.as_slice(),
     });
     let mut text = format!(
-        "{id}: center {} m\n",
+        "{id}:{} center {} m\n",
+        against.map_or_else(String::new, |a| format!(" {}", a.head(WHAT))),
         coordinates(e.center.coords.as_slice())
     );
     text += &doubt(e.reason.as_deref());

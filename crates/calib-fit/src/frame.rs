@@ -97,6 +97,7 @@ pub fn frame(request: &FrameRequest) -> Result<Answer, FitError> {
         file,
         data: Data::Only(input),
         options: &options,
+        against: &|_| None,
     };
     let wish = Wish {
         estimator: request.estimator.as_deref(),

@@ -67,6 +67,7 @@ pub fn handeye(request: &HandEyeRequest) -> Result<Answer, FitError> {
         file,
         data: Data::Only(input),
         options: &options,
+        against: &|_| None,
     };
     let wish = Wish {
         estimator: request.estimator.as_deref(),

@@ -8,6 +8,7 @@ mod aor;
 mod comparison;
 mod cor;
 mod error;
+mod explained;
 mod frame;
 mod handeye;
 mod measured;

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use calib_estimator::{
     Estimate, EstimatorError, EstimatorInfo, Input, InputKind, Kind, OptionId, Options, Outcome,
-    find,
+    Verdict, find,
 };
 use nalgebra::{Point3, Unit};
 
@@ -107,15 +107,6 @@ impl<E: Estimate> Command<E> {
         listed(self.estimators)
     }
 
-    fn line(&self, info: &EstimatorInfo<E>, outcome: &Outcome<E>) -> Line {
-        Line {
-            id: info.id,
-            verdict: outcome.verdict().as_str(),
-            reason: outcome.reason().unwrap_or("").to_owned(),
-            found: outcome.estimate().map(self.found),
-        }
-    }
-
     fn users(&self, option: OptionId) -> Vec<&'static str> {
         let uses = self
             .estimators
@@ -132,6 +123,8 @@ pub(crate) struct Road<'a, E: Estimate + 'static> {
     pub file: &'a Path,
     pub data: Data<'a>,
     pub options: &'a Options,
+    /// What the data as a whole say against an estimate.
+    pub against: &'a dyn Fn(&E) -> Option<String>,
 }
 
 impl<E: Estimate> Road<'_, E> {
@@ -146,9 +139,7 @@ impl<E: Estimate> Road<'_, E> {
         if wish.all {
             let estimators = self.command.estimators.iter();
             let lines: Vec<Line> = estimators
-                .filter_map(|info| {
-                    Some(self.command.line(info, &self.run_with_its_own(info).ok()?))
-                })
+                .filter_map(|info| Some(self.line(info, &self.run_with_its_own(info).ok()?)))
                 .collect();
             return Ok(comparison(self.command.quantity, &lines));
         }
@@ -166,6 +157,20 @@ impl<E: Estimate> Road<'_, E> {
     pub fn run_with_its_own(&self, info: &EstimatorInfo<E>) -> Result<Outcome<E>, EstimatorError> {
         let options = self.options.only(info.options);
         info.run(&self.data.input(info.input), &options)
+    }
+
+    fn line(&self, info: &EstimatorInfo<E>, outcome: &Outcome<E>) -> Line {
+        let against = outcome.estimate().and_then(self.against);
+        let verdict = match against {
+            Some(_) => Verdict::Weak,
+            None => outcome.verdict(),
+        };
+        Line {
+            id: info.id,
+            verdict: verdict.as_str(),
+            reason: against.unwrap_or_else(|| outcome.reason().unwrap_or("").to_owned()),
+            found: outcome.estimate().map(self.command.found),
+        }
     }
 
     /// Some estimator uses every option that was given; otherwise the first that none uses is refused.

@@ -21,6 +21,34 @@ pub enum Instead {
     Text,
 }
 
+/// What was given in place of a recording.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum NoRecording {
+    /// A URDF or a xacro.
+    Robot,
+    /// A profile of calib.
+    Profile,
+}
+
+impl NoRecording {
+    fn what(self) -> &'static str {
+        match self {
+            Self::Robot => "a URDF",
+            Self::Profile => "a profile of calib",
+        }
+    }
+
+    fn remedy(self, file: &str) -> String {
+        match self {
+            Self::Robot => "a profile has one robot: give its URDF first, and then recordings; for a second robot run `calib init` again".to_owned(),
+            Self::Profile => format!(
+                "give the files of the tracker and of the robot; to add recordings to this profile: `calib init --edit {} RECORDING...`",
+                shell_path(file)
+            ),
+        }
+    }
+}
+
 /// Why there is no profile.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
@@ -39,6 +67,14 @@ pub enum InitError {
         file: String,
         /// What it is.
         found: Instead,
+    },
+    /// A robot or a profile was given as a recording.
+    #[error("{file}: this is {}, not a recording\n  help: {}", found.what(), found.remedy(file))]
+    NotARecording {
+        /// The file.
+        file: String,
+        /// What it is.
+        found: NoRecording,
     },
     /// A recording cannot be read, and is no table with a header either.
     #[error(transparent)]
@@ -76,16 +112,27 @@ pub enum InitError {
         joints: Vec<String>,
     },
     /// A link that the robot does not have.
-    #[error("{unknown}\n  help: name the link that carries the markers: {}", .tips.join(", "))]
+    #[error("{unknown}\n  help: {}", instead_of_link(.unknown.nearest.as_deref(), tips))]
     NoSuchLink {
         /// What was asked for, with the nearest name.
         unknown: calib_urdf::UnknownName,
         /// Ends of chains.
         tips: Vec<String>,
     },
+    /// A joint's name in place of a link's.
+    #[error(
+        "`{joint}` is a joint; its link is `{link}`\n  help: if that link carries the markers: `--markers-on {}`",
+        shell_word(link)
+    )]
+    JointForLink {
+        /// The joint.
+        joint: String,
+        /// The link that it moves.
+        link: String,
+    },
     /// Markers on a link that no joint moves, and nothing is recorded.
     #[error(
-        "no joint moves `{link}`: markers there show nothing of the robot\n  help: name the link that carries the markers: {}", .tips.join(", ")
+        "no joint moves `{link}`: markers there show nothing of the robot\n  help: name the link that carries the markers; the chains end at {}", listed(.tips)
     )]
     StillLink {
         /// The link.
@@ -243,6 +290,18 @@ fn listed(names: &[String]) -> String {
     shown.join(", ")
 }
 
+/// What to write for a link that the robot does not have.
+fn instead_of_link(nearest: Option<&str>, tips: &[String]) -> String {
+    let ends = format!("the chains end at {}", listed(tips));
+    match nearest {
+        Some(nearest) => format!(
+            "write `--markers-on {}`, or name another link that carries the markers; {ends}",
+            shell_word(nearest)
+        ),
+        None => format!("name the link that carries the markers; {ends}"),
+    }
+}
+
 /// What was given in place of a URDF.
 fn instead(found: &Instead) -> String {
     match found {
@@ -282,6 +341,7 @@ impl InitError {
     pub fn file(&self) -> Option<&str> {
         match self {
             Self::NotAUrdf { file, .. }
+            | Self::NotARecording { file, .. }
             | Self::NothingMoves { file }
             | Self::NoRange { file, .. }
             | Self::Unread { file, .. }
@@ -308,6 +368,7 @@ impl InitError {
         match self {
             Self::Pipeline(error) => error.exit_code(),
             Self::Recording(_)
+            | Self::NotARecording { .. }
             | Self::NoJoints { .. }
             | Self::HandEye { .. }
             | Self::NothingTracked { .. }

@@ -32,7 +32,7 @@ pub mod words;
 pub mod write;
 mod yaml;
 
-pub use error::{InitError, Instead};
+pub use error::{InitError, Instead, NoRecording};
 pub use fact::{About, Fact, Place};
 pub use instead::{HEAD, not_a_urdf};
 pub use known::Known;

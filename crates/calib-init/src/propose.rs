@@ -61,14 +61,7 @@ pub fn propose(
     };
     let stated = match &request.markers_on {
         None => None,
-        Some(name) => Some(
-            model
-                .link_id(name)
-                .map_err(|unknown| InitError::NoSuchLink {
-                    unknown,
-                    tips: ends(model),
-                })?,
-        ),
+        Some(name) => Some(link_of(model, name)?),
     };
     let known = request.known.as_ref();
     let mut proposal = Proposal {
@@ -150,6 +143,22 @@ fn of_robot(model: &RobotModel) -> Vec<Fact> {
         facts.push(Fact::new(Place::Robot, About::TooLarge { reach }));
     }
     facts
+}
+
+/// A link by its name; that of a joint is no misspelled one.
+fn link_of(model: &RobotModel, name: &str) -> Result<LinkId, InitError> {
+    model
+        .link_id(name)
+        .map_err(|unknown| match model.joint_id(name) {
+            Ok(joint) => InitError::JointForLink {
+                joint: name.to_owned(),
+                link: model.link(model.joint(joint).child).name.clone(),
+            },
+            Err(_) => InitError::NoSuchLink {
+                unknown,
+                tips: ends(model),
+            },
+        })
 }
 
 /// Names of the ends of all chains.

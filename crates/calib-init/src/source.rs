@@ -7,9 +7,10 @@ use calib_recording::{ColumnMap, ReadOptions, Recording, read_bytes};
 use calib_urdf::RobotModel;
 
 use crate::columns::{self, Guess};
-use crate::error::InitError;
+use crate::error::{InitError, NoRecording};
 use crate::fact::About;
 use crate::header::header;
+use crate::instead::HEAD;
 
 /// A file as the caller has it.
 #[derive(Debug, Clone)]
@@ -44,12 +45,18 @@ impl Source {
     /// tracker's names of bodies and markers that the profile calls otherwise, by the profile's.
     ///
     /// # Errors
-    /// [`InitError::Recording`] where neither reads it, or a name in it is taken.
+    /// [`InitError::NotARecording`] for a robot or a profile, [`InitError::Recording`] where neither reads it, or a name in it is taken.
     pub fn read(
         model: &RobotModel,
         file: &File,
         renamed: &BTreeMap<String, String>,
     ) -> Result<Self, InitError> {
+        if let Some(found) = no_recording(&file.bytes) {
+            return Err(InitError::NotARecording {
+                file: file.shown.clone(),
+                found,
+            });
+        }
         let own = read_bytes(&file.shown, &file.bytes, &ReadOptions::default());
         let table = header(&file.bytes);
         let guess = table.as_ref().map(|table| columns::guess(model, table));
@@ -160,6 +167,21 @@ impl Source {
             .unwrap_or_default();
         name.split_once('.').map_or(name, |(stem, _)| stem)
     }
+}
+
+/// Whether some bytes are a robot or a profile.
+fn no_recording(bytes: &[u8]) -> Option<NoRecording> {
+    let head = String::from_utf8_lossy(&bytes[..bytes.len().min(HEAD)]);
+    let text = head.trim_start_matches('\u{feff}').trim_start();
+    if text.starts_with('<') {
+        return text.contains("<robot").then_some(NoRecording::Robot);
+    }
+    // The version is a key of the first level of every profile, and of nothing else.
+    let is_version = |line: &str| {
+        let version = line.strip_prefix("calib:").map(str::trim);
+        version.is_some_and(|v| v.starts_with(|c: char| c.is_ascii_digit()))
+    };
+    text.lines().any(is_version).then_some(NoRecording::Profile)
 }
 
 /// Numbers that the reader took for lost samples because they repeat.

@@ -188,12 +188,15 @@ fn checks_of(inputs: &Inputs, findings: &[Finding], moved: bool) -> Vec<Checked>
     let recordings = || inputs.recordings.values();
     let validation = recordings().any(|r| r.spec.usage == Usage::Validation);
     let streams = recordings().any(|r| r.alignment.is_some());
+    // In a wrong unit no reading is inside its limits, and no body moves as the robot.
+    let units = findings.iter().all(|f| f.id != catalog::UNIT_MISMATCH);
     let unless = |check: DataCheck| {
         let (possible, why) = match check {
+            DataCheck::JointLimits if limited => (units, CheckOutcome::AfterErrors),
             DataCheck::JointLimits => (limited, CheckOutcome::NoJointLimits),
             DataCheck::RigidBodies => (rigid, CheckOutcome::NoRigidBody),
             DataCheck::Validation => (validation, CheckOutcome::NoValidation),
-            DataCheck::Structure => (moved, CheckOutcome::AfterErrors),
+            DataCheck::Structure => (moved && units, CheckOutcome::AfterErrors),
             DataCheck::Clocks => (streams, CheckOutcome::OneTable),
             _ => (true, CheckOutcome::Passed),
         };

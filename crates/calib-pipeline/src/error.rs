@@ -78,6 +78,14 @@ pub enum PipelineError {
         /// The recording.
         recording: String,
     },
+    /// The method estimates origins, and none is stated.
+    #[error(
+        "{file}: the method `paper` estimates the origins of joints, and the profile states none\n  help: state `origins`, or use `method: ml`"
+    )]
+    NoOrigins {
+        /// The profile.
+        file: String,
+    },
     /// An estimator does not take the data of an origin.
     #[error("origin `{origin}`: {cause}\n  help: check the poses of the body")]
     Origin {
@@ -155,6 +163,7 @@ impl PipelineError {
             | Self::Profile(_)
             | Self::Urdf(_)
             | Self::NotSimulated { .. }
+            | Self::NoOrigins { .. }
             | Self::Origin { .. } => ExitCode::Usage,
             Self::Recording(_) | Self::Data { .. } => ExitCode::Data,
             Self::Solve(_) => ExitCode::NotConverged,

@@ -50,6 +50,10 @@ pub fn estimated(
 ) -> Result<Estimated, PipelineError> {
     let method = options.method(&inputs.robot.profile);
     effects::taken(&inputs, method)?;
+    if method == Method::Paper && inputs.robot.profile.origins.is_empty() {
+        let file = inputs.robot.file.clone();
+        return Err(PipelineError::NoOrigins { file });
+    }
     let mut checked = check_data(&mut inputs, of_shapes, options.force)?;
     progress("estimate origins");
     let nominal = nominal(&inputs, &checked.start);

@@ -79,7 +79,7 @@ pub enum PlanError {
     },
     /// No free parameter has the name that was asked for.
     #[error(
-        "{file}: `--of {part}` names no free parameter{}\n  help: give a part of one of their names: {}", words::nearest(nearest.as_deref()), words::some_of(known)
+        "{file}: `--of {part}` names no free parameter{}\n  help: give a part of one of their names: {}", words::nearest(nearest.as_deref()), words::some_of(known, 8)
     )]
     NoSuchParameter {
         /// The profile.
@@ -225,17 +225,17 @@ pub enum PlanError {
     },
     /// A plan was made of something else than is there now.
     #[error(
-        "{file}: the plan expects {}, its postures now reach {}: the profile, the robot or the recordings have changed since\n  help: plan again: `calib plan {}`. Where the recording itself was part of the plan, record into another file with `--out`.", words::sigma_of(*then), words::sigma_of(*now), shell_path(profile)
+        "{file}: when the plan was made: {}; now: {}. The profile, the robot or the recordings have changed since\n  help: plan again: `calib plan {}`. Where the recording itself was part of the plan, record into another file with `--out`.", words::sigmas(*then), words::sigmas(*now), shell_path(profile)
     )]
     Outdated {
         /// The plan.
         file: String,
         /// The profile.
         profile: String,
-        /// σ that the plan states, m; `None`: not determined.
-        then: Option<f64>,
-        /// σ now, m.
-        now: Option<f64>,
+        /// σ before and after its postures that the plan states, m; `None`: not determined.
+        then: [Option<f64>; 2],
+        /// The same now, m.
+        now: [Option<f64>; 2],
     },
     /// The σ that was asked for is not reached.
     #[error(

@@ -257,6 +257,7 @@ fn assumed(
         template: None,
         learned: false,
         marker_sigma: None,
+        is_computed: false,
         poses: BTreeMap::new(),
     };
     if mount.is_none() {

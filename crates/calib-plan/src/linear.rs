@@ -95,7 +95,7 @@ impl Known {
                 moves: moves(body.link),
             };
             match (&track.template, self.start.points.get(name)) {
-                (Some(template), _) if !track.is_computed() => {
+                (Some(template), _) if !track.is_computed => {
                     let markers = template.names.iter().zip(&template.points);
                     subjects.extend(markers.map(|(m, p)| subject(Some(m), link_from_body * p)));
                 }

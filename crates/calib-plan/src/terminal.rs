@@ -1,4 +1,4 @@
-//! The summary on the terminal: at most 24 lines.
+//! The summary on the terminal: at most 24 lines. What is not compared with the surroundings is never cut.
 
 use std::fmt::Write as _;
 
@@ -80,14 +80,17 @@ pub fn summary(plan: &Plan, folder: &str) -> String {
     let mut notes = String::new();
     // What motions are not checked for stands in the last lines.
     let others = plan.notes.iter().filter(|note| !words::is_unchecked(note));
-    // First what is not written, or not determined: the rest may stand on the page alone.
-    let first = |note: &Note| matches!(note, Note::NoClearMotion { .. } | Note::TaskOpen);
-    let (first, rest): (Vec<&Note>, Vec<&Note>) = others.partition(|n| first(n));
-    let count = first.len() + rest.len();
-    for (k, note) in first.into_iter().chain(rest).enumerate() {
-        let one = wrapped(&words::note(note), "note: ", "      ");
-        if notes.lines().count() + one.lines().count() > room {
-            let _ = writeln!(notes, "note: {} more in plan.html", count - k);
+    // First what endangers, then what is not written or not determined: the rest may stand on the page alone.
+    let mut others: Vec<&Note> = others.collect();
+    others.sort_by_key(|note| match note {
+        note if is_danger(note) => 0,
+        Note::NoClearMotion { .. } | Note::TaskOpen => 1,
+        _ => 2,
+    });
+    for (k, note) in others.iter().enumerate() {
+        let one = wrapped(&words::brief(note), "note: ", "      ");
+        if !is_danger(note) && notes.lines().count() + one.lines().count() > room {
+            let _ = writeln!(notes, "note: {} more in plan.html", others.len() - k);
             break;
         }
         notes += &one;
@@ -95,6 +98,11 @@ pub fn summary(plan: &Plan, folder: &str) -> String {
     text += &notes;
     text += &last;
     text
+}
+
+/// Whether the robot may hit something that the user stated.
+fn is_danger(note: &Note) -> bool {
+    matches!(note, Note::SurroundingsUnchecked { .. })
 }
 
 /// σ after so many measured postures.

@@ -21,13 +21,14 @@ pub fn length(meters: Option<f64>) -> String {
     }
 }
 
-/// A σ with its unit; what is not determined says so.
+/// σ before the postures of a plan and after them.
 #[must_use]
-pub fn sigma_of(meters: Option<f64>) -> String {
-    match meters {
-        Some(m) => format!("a σ of {} mm", millimeters(m)),
-        None => "no σ (not determined)".to_owned(),
-    }
+pub fn sigmas([before, after]: [Option<f64>; 2]) -> String {
+    format!(
+        "σ is {} before its postures and {} after them",
+        length(before),
+        length(after)
+    )
 }
 
 /// Three significant digits of a length, mm.
@@ -206,22 +207,16 @@ fn names(names: &[String]) -> String {
     quoted.join(", ")
 }
 
-fn surroundings_unchecked(
-    stated: &[String],
-    links: &[String],
-    unread: &[(String, Option<String>)],
-) -> String {
-    let is = if stated.len() == 1 { "is" } else { "are" };
-    let mut text = format!("{} {is} not compared with", names(stated));
+/// `stated`, `links`, `unread`: the names, as they are listed.
+fn surroundings_unchecked(stated: (&str, bool), links: &str, unread: &str) -> String {
+    let is = if stated.1 { "is" } else { "are" };
+    let mut text = format!("{} {is} not compared with", stated.0);
     if !links.is_empty() {
-        text += &format!(" links without shapes: {}", names(links));
+        text += &format!(" links without shapes: {links}");
     }
     if !unread.is_empty() {
         let also = if links.is_empty() { "" } else { ", nor with" };
-        text += &format!(
-            "{also} shapes that could not be read: {}",
-            of_shapes(unread)
-        );
+        text += &format!("{also} shapes that could not be read: {unread}");
     }
     text += ". The plan may move them through.";
     if !links.is_empty() {
@@ -231,6 +226,28 @@ fn surroundings_unchecked(
         text += &format!(" {READ_THEM}");
     }
     text
+}
+
+/// A note on a terminal: of many names the first ones.
+#[must_use]
+pub fn brief(of: &Note) -> String {
+    /// So many lines has a terminal to spare.
+    const MOST: usize = 3;
+    match of {
+        Note::SurroundingsUnchecked {
+            stated,
+            links,
+            unread,
+        } => {
+            let unread: Vec<String> = unread.iter().map(|(link, _)| link.clone()).collect();
+            surroundings_unchecked(
+                (&some_of(stated, MOST), stated.len() == 1),
+                &some_of(links, MOST),
+                &some_of(&unread, MOST),
+            )
+        }
+        other => note(other),
+    }
 }
 
 /// A note as a sentence, with what to do.
@@ -266,7 +283,11 @@ pub fn note(note: &Note) -> String {
             stated,
             links,
             unread,
-        } => surroundings_unchecked(stated, links, unread),
+        } => surroundings_unchecked(
+            (&names(stated), stated.len() == 1),
+            &names(links),
+            &of_shapes(unread),
+        ),
         Note::StandsThere { stated, links } => format!(
             "In contact with {} in every posture, because no planned joint moves them, and not compared with it: {}.",
             names(stated),
@@ -363,14 +384,13 @@ pub fn nearest(name: Option<&str>) -> String {
     name.map_or_else(String::new, |name| format!("; did you mean `{name}`?"))
 }
 
-/// At most eight names.
+/// The first `most` names.
 #[must_use]
-pub fn some_of(names: &[String]) -> String {
-    const MOST: usize = 8;
-    let shown = names.iter().take(MOST).map(|n| format!("`{n}`"));
+pub fn some_of(names: &[String], most: usize) -> String {
+    let shown = names.iter().take(most).map(|n| format!("`{n}`"));
     let mut shown: Vec<String> = shown.collect();
-    if names.len() > MOST {
-        shown.push(format!("and {} more", names.len() - MOST));
+    if names.len() > most {
+        shown.push(format!("and {} more", names.len() - most));
     }
     shown.join(", ")
 }

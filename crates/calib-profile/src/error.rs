@@ -5,6 +5,7 @@ use std::fmt;
 use calib_finding::nearest_word;
 
 use crate::locate::{Place, Places};
+use crate::slip;
 
 /// One problem.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -199,6 +200,43 @@ fn misformed(form: Form, path: &[String]) -> (String, String) {
     (finding, remedy)
 }
 
+/// The problem of a value that is understood, though YAML or the profile writes it otherwise.
+fn written_otherwise(
+    error: &serde_saphyr::Error,
+    text: &str,
+    place: Option<Place>,
+) -> Option<Problem> {
+    use serde_saphyr::Error as Yaml;
+    match error {
+        Yaml::SerdeMissingField { field, .. } if *field == "calib" && !text.trim().is_empty() => {
+            let first = Place { line: 1, column: 1 };
+            let finding = "the key `calib`, the version of the profile, is missing";
+            let remedy = "write `calib: 1` as the first line";
+            Some(Problem::new(Some(first), finding, remedy))
+        }
+        Yaml::SerdeUnknownField { .. } | Yaml::InvalidScalar { .. } => {
+            let (written, meant) = slip::decimal_comma(text, place?)?;
+            let finding = format!("`{written}` has a decimal comma");
+            let remedy = format!("write a decimal point: `{meant}`");
+            Some(Problem::new(place, finding, remedy))
+        }
+        Yaml::Unexpected { expected, .. } if form(expected) == Some(Form::Keys) => {
+            let path = Places::of(text).path_to(place?)?;
+            let [.., columns, time] = path.as_slice() else {
+                return None;
+            };
+            if columns != "columns" || time != "time" {
+                return None;
+            }
+            let column = slip::plain(text, place?)?;
+            let finding = format!("`time: {column}` does not state the unit of the column");
+            let remedy = format!("write `{}`", slip::time_column(column));
+            Some(Problem::new(place, finding, remedy))
+        }
+        _ => None,
+    }
+}
+
 pub(crate) fn from_yaml(error: &serde_saphyr::Error, text: &str, file: &str) -> ProfileError {
     use serde_saphyr::Error as Yaml;
     let error = error.without_snippet();
@@ -206,6 +244,9 @@ pub(crate) fn from_yaml(error: &serde_saphyr::Error, text: &str, file: &str) -> 
         line: at.line() as usize,
         column: at.column() as usize,
     });
+    if let Some(problem) = written_otherwise(error, text, place) {
+        return ProfileError::new(file, text, vec![problem]);
+    }
     let (finding, remedy) = match error {
         _ if text.trim().is_empty() => (
             "the profile is empty".to_owned(),

@@ -24,6 +24,7 @@ mod locate;
 mod profile;
 pub mod raw;
 mod schema;
+mod slip;
 mod touched;
 mod units;
 

@@ -211,6 +211,21 @@ impl ColumnMap {
         }
     }
 
+    /// Whether the map says what the columns are or how the table is laid out; a map that does not leaves a file its own format.
+    #[must_use]
+    pub fn describes_columns(&self) -> bool {
+        let without = ColumnMap {
+            decimal_comma: false,
+            angles: AngleUnit::default(),
+            lengths: LengthUnit::default(),
+            labels: Vec::new(),
+            lost: Vec::new(),
+            zero_is_a_point: false,
+            ..self.clone()
+        };
+        without != ColumnMap::default()
+    }
+
     /// This map on top of its preset: what is given here wins, maps of the preset are replaced as a whole.
     /// `None` when the preset does not exist.
     pub fn resolved(&self) -> Option<ColumnMap> {

@@ -1,5 +1,6 @@
 //! What a reader says when it cannot go on: the file, the place, what stood there, what was expected, what to do.
 
+use crate::map_fault::MapFault;
 use std::fmt;
 
 /// Where in a file something stands.
@@ -106,13 +107,18 @@ pub enum Problem {
         /// The nearest name in the header.
         nearest: Option<String>,
     },
+    /// A column map contradicts itself.
+    #[error("{0}")]
+    ColumnMap(#[source] MapFault),
     /// Rows of different length.
-    #[error("{found} cells, the header has {expected}")]
+    #[error("{found} cells, the header has {expected}{}", split_number(.decimal_comma))]
     Ragged {
         /// Cells in this row.
         found: usize,
         /// Cells in the header.
         expected: usize,
+        /// Two cells too many that may be one number with a decimal comma.
+        decimal_comma: Option<String>,
     },
     /// A cell or token that is not what it should be.
     #[error("{}, expected {expected}", quoted(.found))]
@@ -307,6 +313,16 @@ impl Problem {
             Problem::IncompleteEntity { .. } => {
                 "export all its columns, or remove those that are there"
             }
+            Problem::ColumnMap(fault) => return fault.remedy(),
+            Problem::Ragged {
+                decimal_comma: Some(_),
+                ..
+            } => {
+                "write decimal points, or separate the cells with `;` and state `columns: {decimal_comma: true}`; otherwise delete the extra cells"
+            }
+            Problem::Ragged {
+                found, expected, ..
+            } if found > expected => "delete the extra cells",
             Problem::Ragged { .. } => "complete the line; a lost sample has empty cells",
             Problem::Unexpected { .. } | Problem::Misfit { .. } => {
                 "export the recording again, or correct it there"
@@ -357,6 +373,13 @@ fn quoted(found: &str) -> String {
     } else {
         format!("found `{found}`")
     }
+}
+
+fn split_number(number: &Option<String>) -> String {
+    number
+        .as_ref()
+        .map(|number| format!("; `{number}` may be a number with a decimal comma"))
+        .unwrap_or_default()
 }
 
 fn did_you_mean(nearest: &Option<String>) -> String {

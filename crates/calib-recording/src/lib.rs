@@ -27,6 +27,7 @@
 mod column_map;
 mod error;
 mod growth;
+mod map_fault;
 mod model;
 mod placeholder;
 mod poses;
@@ -38,6 +39,7 @@ mod units;
 
 pub use column_map::{BodyColumns, ColumnMap, Delimiter, LongColumns, PRESETS, TimeColumn};
 pub use error::{At, Error, Problem};
+pub use map_fault::{MapFault, StatedUnits};
 pub use model::{
     BodyStream, Filled, JointStream, JointUnit, MarkerSample, MarkerStream, Meta, Recording,
     TemperatureStream, Timeline, TorqueStream, WHOLE_ROBOT,

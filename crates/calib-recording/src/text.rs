@@ -104,6 +104,39 @@ pub(crate) fn cells(line: &str, separator: Separator) -> Cells<'_> {
     }
 }
 
+/// Whether no cell of a line holds anything: blanks and separators only.
+#[inline]
+pub(crate) fn is_blank(line: &str, separator: Separator) -> bool {
+    let separates = |b: u8| separator == Separator::Byte(b);
+    line.bytes()
+        .all(|b| b.is_ascii_whitespace() || separates(b))
+}
+
+/// The problem of a row that has another number of cells than the header.
+pub(crate) fn ragged(line: &str, separator: Separator, expected: usize) -> Problem {
+    let cells: Vec<&str> = cells(line, separator).collect();
+    let found = cells.len();
+    let digits = |cell: &str| !cell.is_empty() && cell.bytes().all(|b| b.is_ascii_digit());
+    let whole = |cell: &str| digits(cell.strip_prefix(['-', '+']).unwrap_or(cell));
+    // From the end: a counter may stand before the first number.
+    let (mut pairs, mut example, mut end) = (0, None, found);
+    while end >= 2 {
+        let (before, after) = (cells[end - 2], cells[end - 1]);
+        let is_pair = whole(before) && digits(after);
+        if is_pair {
+            pairs += 1;
+            example.get_or_insert_with(|| format!("{before},{after}"));
+        }
+        end -= if is_pair { 2 } else { 1 };
+    }
+    let split = separator == Separator::Byte(b',') && found > expected;
+    Problem::Ragged {
+        found,
+        expected,
+        decimal_comma: example.filter(|_| split && pairs >= found - expected),
+    }
+}
+
 /// The name in a cell: a doubled quote is one, and a `'` before a formula is none of it.
 pub(crate) fn unquoted(cell: &str) -> String {
     from_cell(&cell.replace("\"\"", "\"")).to_owned()

@@ -103,6 +103,14 @@ impl AngleUnit {
             AngleUnit::Deg => 180.0 / std::f64::consts::PI,
         }
     }
+
+    /// Abbreviation, as it stands behind `_` in a column's name.
+    pub fn name(self) -> &'static str {
+        match self {
+            AngleUnit::Rad => "rad",
+            AngleUnit::Deg => "deg",
+        }
+    }
 }
 
 /// Unit of times in a file.

@@ -189,6 +189,7 @@ impl DataCheck {
                 catalog::JOINT_COLUMN_MISSING,
                 catalog::WRONG_MOUNT,
                 catalog::TRACKER_MOVED,
+                catalog::TRACKER_SCALE,
                 catalog::BODY_REMOUNTED,
                 catalog::MODEL_DISAGREES,
                 catalog::NOT_CHECKED,

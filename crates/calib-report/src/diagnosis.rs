@@ -75,12 +75,14 @@ impl Diagnosis {
             return None;
         }
         let found = clock_offset(report)
+            .or_else(|| scaled(report))
             .or_else(|| error(report))
             .or_else(|| below_noise(report))
             .or_else(|| changed(report))
             .or_else(|| missing_effect(report))
             .or_else(|| named(report))
             .or_else(|| structural(report))
+            .or_else(|| beyond_stated(report))
             .or_else(|| undecided(report))
             .or_else(|| open(report));
         Some(found.unwrap_or(Self::Unexplained))
@@ -142,6 +144,15 @@ const STRUCTURAL: [ReasonId; 6] = [
     ReasonId::OrientationOff,
 ];
 
+/// Recordings in units of length of their own: whatever else is found follows from them.
+fn scaled(report: &Report) -> Option<Diagnosis> {
+    let mut findings = report.findings.iter();
+    let scaled = findings.find(|f| f.id == catalog::TRACKER_SCALE)?;
+    Some(Diagnosis::NamedCause {
+        evidence: scaled.id.as_str().to_owned(),
+    })
+}
+
 /// An error of the data or the model.
 fn error(report: &Report) -> Option<Diagnosis> {
     let is_error = |f: &&crate::Finding| {
@@ -198,7 +209,8 @@ fn changed(report: &Report) -> Option<Diagnosis> {
 }
 
 /// Findings that say what made the errors.
-pub(crate) const NAMED_CAUSES: [Id; 6] = [
+pub(crate) const NAMED_CAUSES: [Id; 7] = [
+    catalog::TRACKER_SCALE,
     catalog::CHANGED_WHILE_RECORDING,
     catalog::MISSING_PHYSICS,
     CAUSES[0],
@@ -289,6 +301,18 @@ fn open(report: &Report) -> Option<Diagnosis> {
     })
 }
 
+/// Errors of the validation that are larger than the fit allows: more poses like them do not mend what makes them.
+fn beyond_stated(report: &Report) -> Option<Diagnosis> {
+    if any_exceeded(report) {
+        return None;
+    }
+    let mut reasons = report.reason_facts.iter();
+    let opens = |effect| matches!(effect, Effect::LeavesOpen | Effect::Rejects);
+    let beyond = reasons.find(|r| r.id == ReasonId::HeldOutBeyondStated && opens(r.effect))?;
+    let evidence = beyond.id.as_str().to_owned();
+    Some(Diagnosis::BeyondStated { evidence })
+}
+
 fn undecided(report: &Report) -> Option<Diagnosis> {
     // More poses do not mend an error that is larger than a limit.
     if any_exceeded(report) {
@@ -330,6 +354,7 @@ fn undecided(report: &Report) -> Option<Diagnosis> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Reason;
     use calib_finding::{Finding, Subject};
 
     /// The diagnosis of a rejected report with these findings.
@@ -354,6 +379,31 @@ mod tests {
     fn fault(evidence: Id) -> Option<Diagnosis> {
         let evidence = evidence.as_str().to_owned();
         Some(Diagnosis::StructuralFault { evidence })
+    }
+
+    #[test]
+    fn errors_beyond_what_is_stated_come_before_poses_that_would_decide_a_limit() {
+        let of = |reasons: Vec<Reason>| {
+            Diagnosis::of(&Report {
+                verdict: Verdict::NotEvaluated,
+                reason_facts: reasons,
+                ..Report::default()
+            })
+        };
+        let undecided = || Reason::new(ReasonId::LimitUndecided, Effect::LeavesOpen);
+        let beyond = |effect| Reason::new(ReasonId::HeldOutBeyondStated, effect);
+        let poses = Diagnosis::TooFewPoses {
+            postures: None,
+            fitted: false,
+        };
+        assert_eq!(of(vec![undecided()]), Some(poses.clone()));
+        assert_eq!(
+            of(vec![undecided(), beyond(Effect::LeavesOpen)]),
+            Some(Diagnosis::BeyondStated {
+                evidence: ReasonId::HeldOutBeyondStated.as_str().to_owned()
+            })
+        );
+        assert_eq!(of(vec![undecided(), beyond(Effect::Warns)]), Some(poses));
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Single markers: lost ones coded as zero, columns written twice, frozen and computed points, the unit of length.
 
 use super::Expectations;
+use crate::rigid_body::{computed_below, decimal_grid};
 use crate::statistics::{median, range};
 use calib_finding::{About, Fact, Finding, Subject, catalog};
 use calib_recording::Poses;
@@ -15,14 +16,12 @@ const SHOWN: f64 = 10.0;
 const MANY_STEPS: usize = 200;
 /// Movement of anything else, m, in which a marker cannot stand exactly still.
 const MOVED: f64 = 1e-3;
-/// Distances between measured markers scatter by at least this, m (the best trackers: 10 µm). Less is computed.
-const TOO_CONSTANT: f64 = 1.5e-6;
 /// Rows from which the scatter of a distance is known well enough.
 const ROWS_FOR_SCATTER: usize = 5;
 /// Rows that are looked at, evenly spread, where all would take long and tell no more.
 const ENOUGH_ROWS: usize = 1000;
-/// A tracked volume is smaller than this, m; more is millimeters taken for meters.
-const LARGEST_VOLUME: f64 = 60.0;
+/// Nothing is tracked from farther away, m: laser trackers reach 160 m. More is millimeters taken for meters.
+const LARGEST_VOLUME: f64 = 200.0;
 
 type Track = [Option<Point3<f64>>];
 
@@ -142,7 +141,9 @@ pub(super) fn frozen(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
             .map(|(_, track)| track.as_slice())
             .collect();
         let moves = travel(track, 0, track.len()) >= MOVED;
-        if (siblings.is_empty() && !moves) || !steps_show(track) {
+        // One that never changes, while others of its body move, has no steps to show.
+        let always = !siblings.is_empty() && runs(track).len() == 1;
+        if (siblings.is_empty() && !moves) || !(always || steps_show(track)) {
             continue;
         }
         let mut rows = Vec::new();
@@ -223,7 +224,7 @@ fn steps_show(track: &Track) -> bool {
         .windows(2)
         .filter_map(|w| Some((w[1]? - w[0]?).amax()))
         .collect();
-    let resolution = decimal_grid(track).unwrap_or_else(|| {
+    let resolution = decimal_grid(track.iter().flatten()).unwrap_or_else(|| {
         // Not decimal (integers times a scale): with many steps the smallest is the grid's.
         let smallest = steps
             .iter()
@@ -237,18 +238,6 @@ fn steps_show(track: &Track) -> bool {
         }
     });
     median(steps).is_some_and(|usual| usual > SHOWN * resolution)
-}
-
-/// The coarsest 10⁻ᵏ m, k ≤ 7, of which all coordinates are multiples.
-fn decimal_grid(track: &Track) -> Option<f64> {
-    (2..=7).map(|k| 10f64.powi(k)).find_map(|per_meter| {
-        let on_grid = |x: &f64| ((x * per_meter).round() - x * per_meter).abs() < 1e-4;
-        track
-            .iter()
-            .flatten()
-            .all(|point| point.iter().all(on_grid))
-            .then_some(1.0 / per_meter)
-    })
 }
 
 /// Maximal runs `start..end` of equal points.
@@ -274,13 +263,16 @@ fn travel(track: &Track, start: usize, end: usize) -> f64 {
 }
 
 /// Groups of three or more moving markers whose distances do not scatter: points of a fitted body, not measurements.
-pub(super) fn virtual_points(poses: &Poses) -> Vec<Finding> {
+pub(super) fn virtual_points(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
     let tracks: Vec<(&String, &Vec<Option<Point3<f64>>>)> = poses
         .markers
         .iter()
         .filter(|(_, track)| travel(track, 0, track.len()) > 10.0 * MOVED)
         .collect();
     let stride = poses.len() / ENOUGH_ROWS + 1;
+    let seen = tracks.iter().flat_map(|(_, track)| track.iter().flatten());
+    // A computed distance scatters no more than a coordinate: it is a difference of two, but only along itself.
+    let too_constant = computed_below(seen, expected.marker_sigma);
     // Markers joined by a distance that does not scatter.
     let mut group: Vec<usize> = (0..tracks.len()).collect();
     let mut worst: BTreeMap<usize, f64> = BTreeMap::new();
@@ -294,7 +286,7 @@ pub(super) fn virtual_points(poses: &Poses) -> Vec<Finding> {
             let mean = distances.iter().sum::<f64>() / distances.len() as f64;
             let squares: f64 = distances.iter().map(|d| (d - mean).powi(2)).sum();
             let sigma = (squares / (distances.len() - 1) as f64).sqrt();
-            if sigma < TOO_CONSTANT {
+            if sigma < too_constant {
                 let (from, to) = (group[i], group[j]);
                 group
                     .iter_mut()

@@ -8,9 +8,11 @@ mod markers;
 mod motion;
 mod rigidity;
 mod rows;
+mod scales;
 mod shapes;
 
 pub use held_out::held_out_in_training;
+pub use scales::other_scales;
 pub use shapes::other_shapes;
 
 use crate::rigid_body::Template;
@@ -53,7 +55,7 @@ pub fn checks(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
         &|| listed(markers::length_unit(poses, expected)),
         &|| listed(markers::duplicates(poses)),
         &|| listed(markers::frozen(poses, expected)),
-        &|| listed(markers::virtual_points(poses)),
+        &|| listed(markers::virtual_points(poses, expected)),
         &|| listed(rigidity::rigidity(poses, expected)),
         &|| listed(rows::repeated(poses)),
         &|| listed(motion::rotations(poses)),

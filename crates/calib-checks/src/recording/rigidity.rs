@@ -4,6 +4,7 @@
 
 mod rows;
 mod template;
+mod two;
 
 use super::Expectations;
 use crate::rigid_body::Template;
@@ -68,6 +69,7 @@ pub(super) fn rigidity(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
             continue;
         }
         let Some(body) = Body::new(name, markers, poses, expected) else {
+            findings.extend(two::changes(name, markers, poses));
             continue;
         };
         if let Some(template) = expected.templates.get(name) {

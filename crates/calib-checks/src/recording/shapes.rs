@@ -111,7 +111,7 @@ impl Body<'_> {
 }
 
 #[cfg(test)]
-mod tests {
+pub(super) mod tests {
     use std::collections::BTreeMap;
 
     use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
@@ -122,7 +122,12 @@ mod tests {
     use super::*;
 
     /// Markers in random poses with noise of 0.3 mm, lengths times `scale`.
-    fn recording(markers: &[Vector3<f64>], rows: usize, scale: f64, rng: &mut ChaCha8Rng) -> Poses {
+    pub(in crate::recording) fn recording(
+        markers: &[Vector3<f64>],
+        rows: usize,
+        scale: f64,
+        rng: &mut ChaCha8Rng,
+    ) -> Poses {
         let normal =
             |rng: &mut ChaCha8Rng| Vector3::from_fn(|_, _| -> f64 { StandardNormal.sample(rng) });
         let mut poses = Poses {

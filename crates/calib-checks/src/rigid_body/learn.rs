@@ -12,6 +12,8 @@ pub(super) const MIN_SPREAD_RATIO: f64 = 0.02;
 
 /// Markers closer than this, m, are one point (a marker's own radius is a few millimeters).
 const MIN_EXTENT: f64 = 1e-3;
+/// On a body of less than ten times that, so are those closer than this part of it.
+const SAME_PLACE: f64 = 0.1;
 
 /// Rounds of registering and averaging; each divides the error by the number of rows or so, ten are usual.
 const MAX_ROUNDS: usize = 200;
@@ -179,10 +181,19 @@ impl Template {
     }
 
     fn check_shape(&self) -> Result<(), NotABody> {
+        let pairs = self.points.iter().enumerate();
+        let distances =
+            pairs.flat_map(|(i, a)| self.points[..i].iter().map(move |b| (a - b).norm()));
+        let extent = distances.fold(0.0, f64::max);
+        // Markers of a body of a few millimeters are small, and as close.
+        let near = match extent < MIN_EXTENT {
+            true => MIN_EXTENT,
+            false => MIN_EXTENT.min(SAME_PLACE * extent),
+        };
         for i in 0..self.points.len() {
             for j in 0..i {
                 let distance = (self.points[i] - self.points[j]).norm();
-                if distance < MIN_EXTENT {
+                if distance < near {
                     let (a, b) = (self.names[j].clone(), self.names[i].clone());
                     return Err(NotABody::Coincident {
                         a,

@@ -17,11 +17,14 @@
 //!
 //! Gower 1975, Psychometrika 40, 33–51 (generalized Procrustes); Kabsch 1976.
 
+mod computed;
 mod gross;
 mod groups;
 mod learn;
 mod pose;
 
+pub use computed::computed_below;
+pub(crate) use computed::decimal_grid;
 pub use gross::Distances;
 pub use groups::rigid_groups;
 pub use learn::{MarkerFit, NotABody, Template};

@@ -227,6 +227,15 @@ pub fn faults() -> Vec<(&'static str, &'static str, bool, Fault)> {
         ),
         (
             "frozen",
+            "a marker keeps its first value in all rows",
+            false,
+            |r, _| {
+                let value = marker(r, "hand_1")[0];
+                marker(r, "hand_1").fill(value);
+            },
+        ),
+        (
+            "frozen",
             "a body keeps its last pose for 10 samples",
             true,
             |r, rng| {
@@ -281,6 +290,21 @@ pub fn faults() -> Vec<(&'static str, &'static str, bool, Fault)> {
             |r, rng| {
                 for point in marker(r, "hand_3").iter_mut().flatten() {
                     *point += Vector3::from_fn(|_, _| 2e-3 * normal(rng));
+                }
+            },
+        ),
+        (
+            "not-rigid",
+            "a reflection in place of one of two markers in every third row",
+            false,
+            |r, _| {
+                r.expected.bodies.insert(
+                    "hand".to_owned(),
+                    vec!["hand_0".to_owned(), "hand_1".to_owned()],
+                );
+                r.expected.templates.remove("hand");
+                for i in (0..36).step_by(3) {
+                    marker(r, "hand_1")[i].as_mut().expect("seen").x += 0.03;
                 }
             },
         ),

@@ -2,7 +2,7 @@
 
 use crate::checks::{FLIPPED, Recorded, faults, forward, record, recorded_q};
 use calib_checks::model::{spoiled_rows, up_axis};
-use calib_checks::{checks, held_out_in_training};
+use calib_checks::{checks, held_out_in_training, other_scales};
 use calib_finding::Id;
 use nalgebra::{Isometry3, UnitQuaternion, Vector3};
 use rand::{RngExt, SeedableRng};
@@ -67,6 +67,17 @@ fn model_faults() -> Vec<(&'static str, &'static str, ModelFault)> {
                 .collect()
         }),
         (
+            "tracker-scale",
+            "a recording whose lengths are 1 % longer",
+            |seed| {
+                let usual = record(seed, false);
+                let mut longer = record(seed + 5000, false).poses;
+                let seen = longer.markers.values_mut().flatten().flatten();
+                seen.for_each(|point| point.coords *= 1.01);
+                other_scales_ids(&usual, &longer)
+            },
+        ),
+        (
             "held-out-in-training",
             "a validation row from the fit",
             |seed| {
@@ -91,6 +102,12 @@ fn model_faults() -> Vec<(&'static str, &'static str, ModelFault)> {
     ]
 }
 
+fn other_scales_ids(recorded: &Recorded, other: &calib_recording::Poses) -> Vec<&'static str> {
+    let recordings = [("usual", &recorded.poses), ("other", other)];
+    let found = other_scales(&recordings, &recorded.expected);
+    found.into_iter().map(|f| f.id.as_str()).collect()
+}
+
 /// Other poses of the same robot.
 fn shift(poses: &mut calib_recording::Poses) {
     let all = poses.joints.values_mut().flatten().flatten();
@@ -112,6 +129,7 @@ fn false_alarms() -> Vec<String> {
         ids.extend(up_axis("+Z", &upright, 0.2).map(|f| f.id.as_str()));
         let mut other = record(9000 + seed, false).poses;
         shift(&mut other);
+        ids.extend(other_scales_ids(&recorded, &other));
         ids.extend(held_out_in_training(&other, &recorded.poses).map(|f| f.id.as_str()));
         if !ids.is_empty() {
             alarms.push(format!("{seed}: {ids:?}"));

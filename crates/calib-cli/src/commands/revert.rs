@@ -10,14 +10,15 @@ use crate::terminal::{Console, emit_paths, say, say_note};
 
 /// Arguments of `calib revert`.
 #[derive(Debug, Args)]
+#[command(group(clap::ArgGroup::new("destination").required(true).args(["out", "in_place"])))]
 pub struct Revert {
     /// The changed file, with its change record `<file>.changes.json` beside it
     file: PathBuf,
     /// Where to write the original
-    #[arg(short, long, required_unless_present = "in_place")]
+    #[arg(short, long)]
     out: Option<PathBuf>,
     /// Overwrite the changed file and remove the record
-    #[arg(long, conflicts_with = "out")]
+    #[arg(long)]
     in_place: bool,
 }
 
@@ -35,4 +36,27 @@ pub fn run(console: &Console, options: &Revert) -> Result<ExitCode, CliError> {
     }
     emit_paths(console.json, &[written])?;
     Ok(ExitCode::Accepted)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Revert;
+    use clap::{Args as _, Command};
+
+    #[test]
+    fn both_destinations_are_named_where_none_is_given() {
+        let parsed = |arguments: &[&str]| {
+            let command = Revert::augment_args(Command::new("revert"));
+            let refused = command.try_get_matches_from(arguments).map(|_| ());
+            refused.map_err(|error| error.to_string())
+        };
+        let said = parsed(&["revert", "arm.urdf"]).expect_err("no destination");
+        assert!(
+            said.contains("--out <OUT>") && said.contains("--in-place"),
+            "{said}"
+        );
+        assert!(parsed(&["revert", "arm.urdf", "--in-place"]).is_ok());
+        assert!(parsed(&["revert", "arm.urdf", "--out", "o.urdf"]).is_ok());
+        assert!(parsed(&["revert", "arm.urdf", "--in-place", "--out", "o.urdf"]).is_err());
+    }
 }

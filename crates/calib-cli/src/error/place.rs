@@ -162,6 +162,7 @@ pub fn of_pipeline(error: &PipelineError) -> &'static str {
         PipelineError::Recording(_) => "recording",
         PipelineError::Data { .. } => "recording-not-usable",
         PipelineError::NotSimulated { .. } => "not-simulated",
+        PipelineError::NoOrigins { .. } => "no-origins",
         PipelineError::Origin { .. } => "origin",
         PipelineError::Solve(_) => "not-solved",
         PipelineError::Patch { .. } | PipelineError::Edit(_) => "urdf-not-patched",
@@ -212,9 +213,9 @@ fn place_of_pipeline(error: &PipelineError) -> Option<Place> {
         }
         PipelineError::Urdf(error) => place_of_urdf(error)?,
         PipelineError::Recording(error) => place_of_recording(error),
-        PipelineError::Data { file, .. } | PipelineError::Patch { file, .. } => {
-            Place::of(file.clone())
-        }
+        PipelineError::Data { file, .. }
+        | PipelineError::Patch { file, .. }
+        | PipelineError::NoOrigins { file } => Place::of(file.clone()),
         _ => return None,
     })
 }

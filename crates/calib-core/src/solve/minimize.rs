@@ -4,7 +4,7 @@
 //! (H + λ S⁻²) δ = −g,   x ⊞ δ accepted when F falls;   stop when −gᵀδ (in σ²) vanishes          (1)
 //! ```
 //!
-//! S holds the parameters' natural scales (prior σ, or 1°, 1 cm): what makes a linearization wrong is the size
+//! S holds the parameters' natural scales ([`natural`]): what makes a linearization wrong is the size
 //! of a step in degrees, not in units of the data's precision, so weakly seen directions are held back first.
 //!
 //! Directions that neither data nor prior see have zero gradient and stay where they start. A prior that is very wide says
@@ -37,6 +37,7 @@ use crate::solve::bounded::{Damped, bounded_step};
 use crate::solve::contraction::{Contraction, both};
 use crate::solve::curvature::Curvature;
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
+use crate::solve::natural::natural;
 use crate::solve::normal::{accumulate, cost};
 use crate::solve::step::{damped_step, retract};
 
@@ -110,11 +111,6 @@ const LITTLE: f64 = 1e-2;
 const UNSEEN_IN_ALL: f64 = 1e-6;
 /// In a curved valley long steps alternate with short ones: a step is compared with the last one of the same damping, so many steps ago at most.
 const PERIOD: usize = 4;
-/// A prior wider than this many typical deviations does not say how far a linearization holds.
-const WIDEST_SCALE: f64 = 30.0;
-/// One wider than this many (300°, 3 m) says nothing: steps are as without it, and values stay where they start along gauges.
-const SAYS_NOTHING: f64 = 300.0;
-
 /// What became of a proposed step.
 enum Step {
     /// Taken, and the minimum is reached with it.
@@ -225,18 +221,7 @@ impl<'a> Descent<'a> {
         Self {
             objective,
             settings,
-            natural: columns
-                .clone()
-                .map(|&p| {
-                    let typical = parameters[p].unit.typical_deviation();
-                    let scale = parameters[p].scale();
-                    if scale > SAYS_NOTHING * typical {
-                        typical.powi(-2)
-                    } else {
-                        scale.min(WIDEST_SCALE * typical).powi(-2)
-                    }
-                })
-                .collect(),
+            natural: natural(model),
             prior: columns
                 .clone()
                 .map(|&p| {

@@ -55,6 +55,12 @@ super::topic! {
             "The tracker reports lengths that differ by {scale:ppm} ± {sigma_scale:ppm} from those of the robot and the stated templates (positive: too long).",
             "Check the tracker's calibration and the unit of the export against a known length.";
     }
+    /// All lengths of a recording differ in one ratio from those of another one.
+    TRACKER_SCALE = "tracker-scale" {
+        "": Error,
+            "Lengths in this recording are {scale:percent} (± {sigma:percent}) longer than in `{other}` (negative: shorter), alike for all bodies.",
+            "Record again without calibrating the tracker in between, or leave the recording out. If its file was written with another scale, export it again.";
+    }
     /// A joint stops off its readings by more than the others.
     JOINT_SCATTERS = "joint-scatters" {
         "rows": Warning,

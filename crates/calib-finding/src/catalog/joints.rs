@@ -135,9 +135,9 @@ super::topic! {
     }
     /// Joints with readings that never change.
     JOINTS_STOOD_STILL = "joints-stood-still" {
-        "": Info,
-            "No recording moves {joints}, so their axes and zeros are not calibrated, and postures in which they stand elsewhere are not covered.",
-            "Move them in some recordings. If something other than its own motor moves one of them (a passive joint), declare what: `<mimic>` in the URDF, or `coupled_to` under `solve: {joints: …}`. With `free: []` there you state that it is locked.";
+        "": Warning,
+            "No recording moves {joints}: zero and axis of such a joint are not calibrated, and postures in which it stands elsewhere are not covered.",
+            "Move it in some recordings. If something other than its own motor moves it (a passive joint), declare what: `<mimic>` in the URDF, or `coupled_to` under `solve: {joints: …}`. With `free: []` there you state that it is locked.";
     }
     /// Growth with temperature is free, and a recording has no temperature.
     TEMPERATURE_MISSING = "temperature-missing" {

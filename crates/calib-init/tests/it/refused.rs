@@ -62,7 +62,33 @@ fn bad_input_is_named_with_a_remedy() {
         .err()
         .map(|e| e.to_string())
         .unwrap_or_default();
-    assert!(said.contains("did you mean `flange`?"), "{said}");
+    assert!(
+        said.contains("did you mean `flange`?\n  help: write `--markers-on flange`, or "),
+        "{said}"
+    );
+    assert!(said.ends_with("the chains end at `link_6`"), "{said}");
+    // A joint in place of its link.
+    let joint = Request {
+        markers_on: Some("joint_3".to_owned()),
+        ..request()
+    };
+    let said = propose(&arm(), &joint, &[])
+        .expect_err("a joint")
+        .to_string();
+    assert!(
+        said.starts_with("`joint_3` is a joint; its link is `link_3`\n  help: "),
+        "{said}"
+    );
+    // A robot and a profile in place of recordings.
+    let said = refused(&[files(&good)[0].clone(), file("second", URDF)]);
+    assert!(said.contains("this is a URDF, not a recording"), "{said}");
+    let profile = "# Made by `calib init`.\ncalib: 1\nrobot: {name: a, urdf: a.urdf}\n";
+    let said = refused(&[file("profile", profile)]);
+    assert!(
+        said.contains("this is a profile of calib, not a recording"),
+        "{said}"
+    );
+    assert!(said.contains("calib init --edit "), "{said}");
     // Nothing to calibrate.
     let fixed = RobotModel::from_urdf_text(
         "<robot name=\"stone\"><link name=\"a\"/></robot>",

@@ -165,8 +165,8 @@ fn of_robot(
         return (Vec::new(), Vec::new());
     };
     let changes = information.map_or_else(Vec::new, |of| robot_changes(e.inputs, fit, of));
-    let effects = e.causes.lacks_effects();
-    (changes, accuracy_limits(e.inputs, e.held_out, fit, effects))
+    let limits = accuracy_limits(e.inputs, e.held_out, fit, &tracker_noise(e, fit));
+    (changes, limits)
 }
 
 fn residuals(e: &Evidence<'_>) -> Residuals {
@@ -192,12 +192,17 @@ fn verification(e: &Evidence<'_>, verdict: Verdict) -> Verification {
     }
 }
 
+/// The tracker's noise, without what the model lacks.
+fn tracker_noise<'a>(e: &Evidence<'a>, fit: &'a MlFit) -> TrackerNoise<'a> {
+    TrackerNoise::beside_lacking(fit, e.inputs, e.tracks, e.causes.lacks_effects())
+}
+
 /// The held-out errors with the share of the tracker's noise.
 fn held_out(e: &Evidence<'_>) -> Option<HeldOut> {
     let mut held_out = e.held_out.cloned()?;
     let tracker_m = e
         .fit
-        .and_then(|fit| TrackerNoise::of(fit, e.causes.lacks_effects()).over(e.inputs, &held_out));
+        .and_then(|fit| tracker_noise(e, fit).over(e.inputs, &held_out));
     if let Some(expected) = &mut held_out.expected {
         expected.tracker_m = tracker_m;
     }

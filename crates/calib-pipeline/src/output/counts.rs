@@ -105,7 +105,7 @@ fn subjects(
             continue;
         }
         match &body.kind {
-            BodyKind::Markers { names, .. } if !tracks[name].is_computed() => {
+            BodyKind::Markers { names, .. } if !tracks[name].is_computed => {
                 let seen = names.iter().filter_map(|marker| {
                     let track = loaded.poses.markers.get(marker)?;
                     Some((marker.clone(), track.iter().map(Option::is_some).collect()))

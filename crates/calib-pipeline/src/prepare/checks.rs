@@ -4,7 +4,7 @@ use std::borrow::Cow;
 use std::collections::{BTreeMap, BTreeSet};
 
 use calib_checks::rigid_body::Template;
-use calib_checks::{Expectations, checks, held_out_in_training, other_shapes};
+use calib_checks::{Expectations, checks, held_out_in_training, other_scales, other_shapes};
 use calib_core::effect::{Drives, Effect, Source};
 use calib_finding::{About, Fact, Finding, Severity, Subject, Unit, catalog};
 use calib_profile::{BodyKind, Contact, Free, JointFree, Load, Usage};
@@ -14,6 +14,7 @@ use calib_urdf::JointId;
 
 use crate::prepare::conditions::{missing_temperatures, missing_torques};
 use crate::prepare::inputs::{Inputs, Loaded};
+use crate::prepare::slides::scales;
 use crate::prepare::untracked::missing_bodies;
 
 /// Fewest rows of a recording that a fit can use: a sphere has four unknowns, and one row must check it.
@@ -69,14 +70,17 @@ pub fn check(inputs: &Inputs) -> Vec<Finding> {
     findings
 }
 
-/// Bodies with another shape in another recording.
+/// Bodies with another shape, and lengths of another scale, in another recording.
 fn shapes(inputs: &Inputs) -> Vec<Finding> {
     let Some(any) = inputs.recordings.values().next() else {
         return Vec::new();
     };
     let all = inputs.recordings.values();
     let all: Vec<(&str, &Poses)> = all.map(|r| (r.name.as_str(), &r.poses)).collect();
-    other_shapes(&all, &expectations(inputs, any))
+    let expected = expectations(inputs, any);
+    let mut findings = other_shapes(&all, &expected);
+    findings.extend(other_scales(&all, &expected));
+    findings
 }
 
 /// What the tracker saw: coordinates of touched points are stated, and in a frame of their own.
@@ -117,7 +121,7 @@ fn fewest_poses(inputs: &Inputs, loaded: &Loaded) -> usize {
     }
 }
 
-/// A joint that moves less than this stood still, rad or m: encoders flicker by less.
+/// A joint that moves less than this stood still, rad, or m where the robot is large: encoders flicker by less.
 const STILL: f64 = 1e-3;
 
 /// Joints of what is measured that are in the recordings and that no recording moves.
@@ -137,6 +141,7 @@ fn stood_still(inputs: &Inputs) -> Option<Finding> {
             held || !own.coupled_to.is_empty()
         })
     };
+    let scales = scales(inputs);
     let still = |joint: &JointId| {
         let name = &model.joint(*joint).name;
         let columns = inputs.recordings.values();
@@ -146,7 +151,7 @@ fn stood_still(inputs: &Inputs) -> Option<Finding> {
             let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| {
                 (l.min(q), h.max(q))
             });
-            high - low < STILL
+            high - low < STILL * scales[joint.index()]
         }
     };
     let names: Vec<String> = carrying

@@ -153,11 +153,9 @@ fn check_joint_names(
     spec: &RecordingSpec,
     recording: &mut Recording,
 ) -> Result<(), PipelineError> {
-    let mapped = spec.columns.is_some()
-        || spec
-            .robot_log
-            .as_ref()
-            .is_some_and(|log| log.columns.is_some());
+    let log = spec.robot_log.as_ref();
+    let mapped = describes_columns(spec.columns.as_ref())
+        || describes_columns(log.and_then(|log| log.columns.as_ref()));
     if mapped {
         let known = |name: &str| robot.model.joint_id(name).is_ok();
         recording.joints.retain(|j| known(&j.name));
@@ -230,7 +228,7 @@ fn read(
     let of_tables = &estimators.tables.reader;
     let entry = match &spec.reader {
         Some(id) if !built_in(id) || !spec.reader_parameters.is_empty() => Some(of_tables.get(id)?),
-        None if spec.columns.is_none() => of_tables.recognizing(bytes),
+        None if !describes_columns(spec.columns.as_ref()) => of_tables.recognizing(bytes),
         _ => None,
     };
     let Some(entry) = entry else {
@@ -242,6 +240,11 @@ fn read(
         return Ok(calib_recording::read_bytes(shown, bytes, &options)?);
     };
     readers::read(entry, &values(&spec.reader_parameters), shown, bytes)
+}
+
+/// Whether there is a map that says what the columns are.
+fn describes_columns(map: Option<&ColumnMap>) -> bool {
+    map.is_some_and(ColumnMap::describes_columns)
 }
 
 /// What is known of a table before it is read; `of_robot`: it is the robot's own log.

@@ -24,6 +24,7 @@ pub mod row_noise;
 pub mod rows;
 pub mod scatter;
 pub mod settled;
+pub(crate) mod slides;
 mod speeds;
 pub mod split;
 pub mod stopped;

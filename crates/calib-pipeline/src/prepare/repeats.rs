@@ -11,8 +11,9 @@ use calib_profile::Usage;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::prepare::inputs::{Inputs, Loaded};
+use crate::prepare::slides::scales;
 
-/// Joint values of a robot at rest stay within this, rad or m: two steps of an encoder of 16 bits, 0.011°.
+/// Joint values of a robot at rest stay within this, rad, or m where the robot is large: two steps of an encoder of 16 bits, 0.011°.
 const JITTER: f64 = 2e-4;
 /// Frames of a robot at rest agree to this, m. Where they do not, the joint values are not those of the rows.
 const AT_REST: f64 = 5e-3;
@@ -23,12 +24,13 @@ const COPIED: f64 = 1e-6;
 pub fn merge(inputs: &mut Inputs) -> Vec<Finding> {
     let mut findings = Vec::new();
     let mut moved = Vec::new();
+    let scales = scales(inputs);
     for loaded in inputs.recordings.values_mut() {
         let fitted = loaded.spec.usage != Usage::Validation;
         if !fitted || loaded.alignment.is_some() || !loaded.shapes.is_empty() {
             continue;
         }
-        let groups = postures(loaded);
+        let groups = postures(loaded, &scales);
         if groups.len() == loaded.q.len() {
             continue;
         }
@@ -65,7 +67,7 @@ pub fn merge(inputs: &mut Inputs) -> Vec<Finding> {
 
 /// Successive rows in which every joint stays within the jitter, where the bodies stood still meanwhile. A row that shows nothing is one of its own,
 /// and ends no posture.
-fn postures(loaded: &Loaded) -> Vec<Vec<usize>> {
+fn postures(loaded: &Loaded, scales: &[f64]) -> Vec<Vec<usize>> {
     let mut groups: Vec<Vec<usize>> = Vec::new();
     // Group of the posture, and smallest and largest value of every joint in it.
     let mut posture: Option<(usize, Vec<(f64, f64)>)> = None;
@@ -76,11 +78,12 @@ fn postures(loaded: &Loaded) -> Vec<Vec<usize>> {
         }
         let own: Vec<(f64, f64)> = q.iter().flatten().map(|&q| (q, q)).collect();
         let goes_on = posture.as_mut().filter(|(group, span)| {
-            let within = |((least, most), (q, _)): (&(f64, f64), &(f64, f64))| {
-                most.max(*q) - least.min(*q) <= JITTER
+            let within = |joint: usize| {
+                let ((least, most), (q, _)) = (span[joint], own[joint]);
+                most.max(q) - least.min(q) <= JITTER * scales[joint]
             };
             let rests = !own.is_empty() && span.len() == own.len();
-            rests && span.iter().zip(&own).all(within) && at_rest(loaded, groups[*group][0], row)
+            rests && (0..own.len()).all(within) && at_rest(loaded, groups[*group][0], row)
         });
         match goes_on {
             Some((group, span)) => {

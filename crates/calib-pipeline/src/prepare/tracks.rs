@@ -2,7 +2,9 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use calib_checks::rigid_body::{BodyPoses, Distances, NotABody, RowPose, Template, body_poses};
+use calib_checks::rigid_body::{
+    BodyPoses, Distances, NotABody, RowPose, Template, body_poses, computed_below,
+};
 use calib_finding::nearest_word;
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::{Body, BodyKind, Usage};
@@ -23,20 +25,13 @@ pub struct BodyTrack {
     pub learned: bool,
     /// Standard deviation of a marker coordinate about the rigid body, m, where it can be told.
     pub marker_sigma: Option<f64>,
+    /// Whether the markers are points of one fitted body: then they are one 6-DoF measurement, not several.
+    pub is_computed: bool,
     /// `tracker_from_body` per recording and row; absent recordings do not show the body.
     pub poses: BTreeMap<String, Vec<Option<Isometry3<f64>>>>,
 }
 
-/// Markers that keep their distances to better than this were computed from a fitted body, not measured, m.
-const COMPUTED: f64 = 2e-6;
-
 impl BodyTrack {
-    /// Whether the markers are points of one fitted body: then they are one 6-DoF measurement, not several.
-    #[must_use]
-    pub fn is_computed(&self) -> bool {
-        self.template.is_some() && self.marker_sigma.is_some_and(|s| s < COMPUTED)
-    }
-
     /// Poses in one recording; empty where the body is not in it.
     #[must_use]
     pub fn in_recording(&self, recording: &str) -> &[Option<Isometry3<f64>>] {
@@ -153,7 +148,11 @@ fn seen_instead(inputs: &Inputs, name: &str, body: &Body) -> SeenInstead {
 
 /// A marker that wanders on its body: it is loose or mislabeled.
 fn loose_marker(body: &str, all: &BodyPoses, stated: Option<f64>) -> Option<Finding> {
-    let limit = (8.0 * stated.unwrap_or(0.0005)).max(0.003);
+    // The marker that keeps its distances best tells the noise of a coordinate where none is stated.
+    let steadiest = all.fits.iter().map(|fit| fit.wandering);
+    let steadiest = steadiest.fold(f64::INFINITY, f64::min) / std::f64::consts::SQRT_2;
+    let sigma = stated.unwrap_or(steadiest.max(0.0005));
+    let limit = (8.0 * sigma).max(0.003);
     let (fit, wander) = all.moving_marker(limit)?;
     Some(
         Finding::new(catalog::BODY_NOT_RIGID, Subject::body(body))
@@ -190,6 +189,7 @@ fn body_track(
         template: None,
         learned: false,
         marker_sigma: None,
+        is_computed: false,
         poses: BTreeMap::new(),
     };
     let not_seen = || {
@@ -271,6 +271,8 @@ fn body_track(
     // Points that stand for many markers scatter less than each of these.
     let of_markers = inputs.condensed.get(name).copied();
     track.marker_sigma = of_markers.unwrap_or(all.sigma);
+    let below = computed_below(gathered.iter().flatten().flatten(), stated);
+    track.is_computed = track.marker_sigma.is_some_and(|sigma| sigma < below);
     track.template = Some(all.template);
     Ok(track)
 }

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use calib_core::effect::Source;
-use calib_core::{Configuration, EffectKind, NoiseKind};
+use calib_core::{Configuration, EffectKind, NoiseKind, Target};
 use calib_geometry::so3;
 use calib_profile::{Body, BodyKind, Usage};
 use calib_report::{AccuracyLimit, ErrorSource, HeldOut, PoseError, Workspace, WorkspacePoint};
@@ -72,14 +72,14 @@ pub(crate) fn workspace(inputs: &Inputs, fit: &MlFit) -> Option<Workspace> {
     let model = &inputs.robot.model;
     let tool = tool_link(inputs)?;
     let root = fit.formulation.links[model.root().index()]?;
-    let link = fit.formulation.links[tool.index()]?;
-    let body = fit
-        .formulation
-        .bodies
-        .iter()
-        .find(|(name, _)| inputs.robot.profile.bodies[*name].link == tool);
-    // The body, not the link: a zero offset against a mount is a convention that a link frame would show as error.
-    let (name, target) = body.map_or((&model.link(tool).name, link), |(n, frame)| (n, *frame));
+    let mut bodies = inputs.robot.profile.bodies.iter();
+    let body = bodies.find(|(name, body)| {
+        let seen = &fit.formulation;
+        body.link == tool && (seen.bodies.contains_key(*name) || seen.points.contains_key(*name))
+    });
+    // What was seen, not the link: a zero offset against a mount is a convention that a link frame would show as error.
+    let name = body.map_or(&model.link(tool).name, |(name, _)| name);
+    let target = *targets(fit, name, tool).first()?;
     let rows: Vec<&Vec<f64>> = inputs
         .recordings
         .values()
@@ -90,41 +90,32 @@ pub(crate) fn workspace(inputs: &Inputs, fit: &MlFit) -> Option<Workspace> {
     let mut points = Vec::new();
     for q in rows.iter().step_by(step) {
         let at = configuration(inputs, fit, q);
-        let place = fit.solution.relative_pose(root, target, &at).ok()?;
+        let place = fit.solution.linear_point(root, target, &at).ok()?;
         // Seen from the tracker, as everything that was verified: where the robot's base begins is another convention.
-        let seen = fit
-            .solution
-            .relative_pose(fit.formulation.tracker, target, &at)
-            .ok()?;
+        let tracker = fit.formulation.tracker;
+        let seen = fit.solution.known_point(tracker, target, &at).ok()?;
         points.push(WorkspacePoint {
-            position_m: place.pose.translation.vector.into(),
-            sigma_m: seen
-                .covariance?
-                .fixed_view::<3, 3>(3, 3)
-                .trace()
-                .max(0.0)
-                .sqrt(),
+            position_m: place.position.coords.into(),
+            sigma_m: seen.covariance?.trace().max(0.0).sqrt(),
         });
     }
     Workspace::of(name, &model.link(model.root()).name, points)
         .map(|w| w.relative_to(&inputs.robot.profile.tracker.frame))
 }
 
-/// What a held-out error is made of: rms over the bodies and postures that were held out, in meters. `lacking`: the model lacks an effect.
+/// What a held-out error is made of: rms over the bodies and postures that were held out, in meters, beside the noise of the tracker.
 pub(crate) fn accuracy_limits(
     inputs: &Inputs,
     held_out: Option<&HeldOut>,
     fit: &MlFit,
-    lacking: bool,
+    tracker: &TrackerNoise<'_>,
 ) -> Vec<AccuracyLimit> {
     let Some((held_out, measured)) = held_out.and_then(|h| Some((h, h.calibrated?))) else {
         return Vec::new();
     };
     let of_errors = OfErrors::of(inputs, held_out, fit);
     let parameters = of_errors.parameters;
-    let tracker = TrackerNoise::of(fit, lacking)
-        .over(inputs, held_out)
-        .unwrap_or(0.0);
+    let tracker = tracker.over(inputs, held_out).unwrap_or(0.0);
     let joints = fit.joint_sigma().unwrap_or(0.0) * of_errors.lever;
     let explained = parameters.powi(2) + tracker.powi(2) + joints.powi(2);
     let rest = (measured.rms_m.powi(2) - explained).max(0.0).sqrt();
@@ -210,18 +201,32 @@ fn body_of<'a>(inputs: &'a Inputs, subject: &String) -> Option<(&'a String, &'a 
     })
 }
 
-/// Variance of a body's position as the tracker sees it, by the parameters alone, m².
+/// Variance of a body's position as the tracker sees it, by the parameters alone, m²: of its origin or, where it has no orientation, the mean
+/// over its markers.
 fn variance_of(inputs: &Inputs, fit: &MlFit, (name, link): (&String, LinkId), q: &[f64]) -> f64 {
-    let of_body = fit.formulation.bodies.get(name).copied();
-    let Some(target) = of_body.or(fit.formulation.links[link.index()]) else {
-        return 0.0;
-    };
     let at = configuration(inputs, fit, q);
-    let seen = fit
-        .solution
-        .relative_pose(fit.formulation.tracker, target, &at);
-    let covariance = seen.ok().and_then(|seen| seen.covariance);
-    covariance.map_or(0.0, |c| c.fixed_view::<3, 3>(3, 3).trace().max(0.0))
+    let targets = targets(fit, name, link);
+    let variance = |target: &Target| {
+        let tracker = fit.formulation.tracker;
+        let seen = fit.solution.known_point(tracker, *target, &at);
+        let covariance = seen.ok().and_then(|seen| seen.covariance);
+        covariance.map_or(0.0, |c| c.trace().max(0.0))
+    };
+    let sum: f64 = targets.iter().map(variance).sum();
+    sum / targets.len().max(1) as f64
+}
+
+/// What is seen of a body: its origin, its markers where it has no orientation, or else the link that carries it.
+fn targets(fit: &MlFit, name: &str, link: LinkId) -> Vec<Target> {
+    let formulation = &fit.formulation;
+    if let Some(body) = formulation.bodies.get(name) {
+        return vec![Target::Frame(*body)];
+    }
+    if let Some(points) = formulation.points.get(name).filter(|p| !p.is_empty()) {
+        return points.values().copied().map(Target::Point).collect();
+    }
+    let link = formulation.links[link.index()];
+    link.map(Target::Frame).into_iter().collect()
 }
 
 /// Sum of squares over the joints of how far a link moves per radian, m².
@@ -272,9 +277,9 @@ impl ToolBody<'_> {
         fit: &MlFit,
         level: &dyn Fn(NoiseKind, f64) -> f64,
     ) -> Option<f64> {
-        let noise = TrackerNoise::of(fit, false);
+        let noise = TrackerNoise::of(fit);
         let track = tracks.get(self.name)?;
-        if *self.kind == BodyKind::Pose || track.is_computed() {
+        if *self.kind == BodyKind::Pose || track.is_computed {
             let mut noise = fit.solution.noise.iter();
             let found = noise.find(|n| n.kind == NoiseKind::Orientation)?;
             let variance = level(NoiseKind::Orientation, found.sigma.powi(2));

@@ -146,7 +146,7 @@ impl OfBody<'_> {
         let angle = pair.map(|(predicted, seen)| predicted.rotation.angle_to(&seen.rotation));
         match &self.body.kind {
             // Points computed from one pose are one measurement.
-            BodyKind::Markers { names, .. } if !self.track.is_computed() => {
+            BodyKind::Markers { names, .. } if !self.track.is_computed => {
                 for (i, marker) in names.iter().enumerate() {
                     let seen = loaded.poses.markers.get(marker).and_then(|t| t[row]);
                     if let Some((on_link, seen)) = self.on_link(robot, i, marker).zip(seen) {

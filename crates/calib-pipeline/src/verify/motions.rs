@@ -4,14 +4,15 @@ use calib_profile::Usage;
 use calib_urdf::JointId;
 
 use crate::prepare::inputs::{Inputs, Loaded};
+use crate::prepare::slides::scales;
 
-/// Smallest motion of a joint that counts, rad or m: 2°, 35 mm.
+/// Smallest motion of a joint that counts, rad, or m where the robot is large: 2°, 35 mm.
 const MOVED: f64 = 0.035;
 /// Recordings in which a smaller share of the rows has two joints away from their usual places move one at a time.
 const COMBINED: f64 = 0.1;
 /// Held-out poses verify a joint that they move over at least this share of its fitted range.
 const VERIFIED: f64 = 0.1;
-/// Joint readings closer than this are one posture, rad or m: three encoder steps of a good robot.
+/// Joint readings closer than this are one posture, rad, or m where the robot is large: three encoder steps of a good robot.
 const SAME: f64 = 1e-3;
 /// Readings of one posture differ by less than this many standard deviations of their noise.
 const WITHIN: f64 = 4.0;
@@ -43,22 +44,24 @@ pub(crate) fn motions(inputs: &Inputs, joint_sigma: f64) -> Motions {
             .collect()
     };
     let (fitted, held_out) = (of(false), of(true));
+    let scales = scales(inputs);
+    let counts = |joint: JointId| MOVED * scales[joint.index()];
     let moved: Vec<(JointId, (f64, f64))> = model
         .independent_joints()
         .filter_map(|joint| Some((joint, range(&fitted, joint)?)))
-        .filter(|(_, (low, high))| high - low > MOVED)
+        .filter(|(joint, (low, high))| high - low > counts(*joint))
         .collect();
     let joints: Vec<JointId> = moved.iter().map(|(joint, _)| *joint).collect();
     let held_out_rows = rows(&held_out);
     let one_by_one = |recordings: &[&Loaded]| {
         joints.len() > 1
             && recordings.iter().any(|r| r.q.iter().flatten().count() > 1)
-            && combined_share(recordings, &joints) < COMBINED
+            && combined_share(recordings, &joints, &counts) < COMBINED
     };
     let beyond = |q: &&&Vec<f64>| {
         moved.iter().any(|(joint, (low, high))| {
             let at = q[joint.index()];
-            at < low - MOVED || at > high + MOVED
+            at < low - counts(*joint) || at > high + counts(*joint)
         })
     };
     let still = moved.iter().filter(|(joint, (low, high))| {
@@ -80,7 +83,7 @@ pub(crate) fn motions(inputs: &Inputs, joint_sigma: f64) -> Motions {
             &held_out_rows,
             rows(&fitted),
             &model.independent_joints().collect::<Vec<_>>(),
-            SAME.max(WITHIN * joint_sigma),
+            &|joint| SAME.max(WITHIN * joint_sigma) * scales[joint.index()],
         ),
     }
 }
@@ -102,7 +105,11 @@ fn range(recordings: &[&Loaded], joint: JointId) -> Option<(f64, f64)> {
 }
 
 /// Share of the rows in which two joints are away from where they usually are in their recording.
-fn combined_share(recordings: &[&Loaded], joints: &[JointId]) -> f64 {
+fn combined_share(
+    recordings: &[&Loaded],
+    joints: &[JointId],
+    counts: &dyn Fn(JointId) -> f64,
+) -> f64 {
     let (mut combined, mut all) = (0_usize, 0_usize);
     for loaded in recordings {
         let rows: Vec<&Vec<f64>> = loaded.q.iter().flatten().collect();
@@ -117,19 +124,20 @@ fn combined_share(recordings: &[&Loaded], joints: &[JointId]) -> f64 {
         all += rows.len();
         for q in &rows {
             let away = joints.iter().zip(&usual);
-            let away = away.filter(|(joint, usual)| (q[joint.index()] - **usual).abs() > MOVED);
+            let away =
+                away.filter(|(joint, usual)| (q[joint.index()] - **usual).abs() > counts(**joint));
             combined += usize::from(away.count() > 1);
         }
     }
     combined as f64 / all.max(1) as f64
 }
 
-/// How many of `rows` have a posture of `known` within `tolerance` in every joint.
+/// How many of `rows` have a posture of `known` within the tolerance of every joint.
 fn repeated(
     rows: &[&Vec<f64>],
     mut known: Vec<&Vec<f64>>,
     joints: &[JointId],
-    tolerance: f64,
+    tolerance: &dyn Fn(JointId) -> f64,
 ) -> usize {
     // Sorted by the joint that moves most, few are left to compare.
     let spread = |joint: &JointId| {
@@ -139,22 +147,22 @@ fn repeated(
         });
         high - low
     };
-    let Some(key) = joints
+    let Some((key, near)) = joints
         .iter()
         .max_by(|a, b| spread(a).total_cmp(&spread(b)))
-        .map(|joint| joint.index())
+        .map(|joint| (joint.index(), tolerance(*joint)))
     else {
         return 0;
     };
     known.sort_by(|a, b| a[key].total_cmp(&b[key]));
     let repeats = |q: &&&Vec<f64>| {
-        let first = known.partition_point(|k| k[key] < q[key] - tolerance);
-        let near = known[first..]
+        let first = known.partition_point(|k| k[key] < q[key] - near);
+        let mut candidates = known[first..]
             .iter()
-            .take_while(|k| k[key] <= q[key] + tolerance);
-        near.into_iter().any(|k| {
-            let mut differences = joints.iter().map(|j| (k[j.index()] - q[j.index()]).abs());
-            differences.all(|difference| difference <= tolerance)
+            .take_while(|k| k[key] <= q[key] + near);
+        candidates.any(|k| {
+            let mut joints = joints.iter();
+            joints.all(|j| (k[j.index()] - q[j.index()]).abs() <= tolerance(*j))
         })
     };
     rows.iter().filter(repeats).count()

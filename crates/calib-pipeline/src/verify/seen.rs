@@ -71,7 +71,7 @@ impl<'a> View<'a> {
     ) -> Vec<(usize, Point3<f64>, Point3<f64>)> {
         let track = &self.tracks[name];
         match &body.kind {
-            BodyKind::Markers { names, .. } if !track.is_computed() => {
+            BodyKind::Markers { names, .. } if !track.is_computed => {
                 let fitted = self.robot.points.get(name);
                 let of_marker = |(k, marker): (usize, &String)| {
                     let known = fitted.and_then(|p| p.get(marker)).copied();

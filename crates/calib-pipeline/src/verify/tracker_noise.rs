@@ -2,12 +2,17 @@
 
 use std::collections::BTreeMap;
 
-use calib_core::{FrameId, GroupId, MeasurementKind, NoiseKind, PointId, PoseNoise};
+use calib_core::{FrameId, GroupId, MeasurementKind, NoiseEstimate, NoiseKind, PointId, PoseNoise};
 use calib_report::{HeldOut, PoseError};
 
 use crate::formulate::formulation::MlFit;
+use crate::formulate::ml::MARKER_SIGMA;
 use crate::formulate::row_levels::HeldOutLevels;
 use crate::prepare::inputs::{Inputs, Loaded};
+use crate::prepare::tracks::BodyTrack;
+
+/// A level that was found scatters by a tenth; one above the markers' own scatter by more than this factor is not theirs.
+const CLEARLY: f64 = 1.3;
 
 /// Variances of one coordinate of a measured position, m².
 #[derive(Debug, Clone, Default)]
@@ -21,12 +26,47 @@ pub(crate) struct TrackerNoise<'a> {
 }
 
 impl<'a> TrackerNoise<'a> {
-    /// Of a fit. `lacking`: the model lacks an effect, and what it lacks is found as noise too, so no more than was stated is the tracker's.
-    pub(crate) fn of(fit: &'a MlFit, lacking: bool) -> Self {
-        let level = |group: GroupId| {
+    /// Of a fit, as it found it.
+    pub(crate) fn of(fit: &'a MlFit) -> Self {
+        Self::with(fit, &|_, found| found.sigma)
+    }
+
+    /// The part of what a fit found that is the tracker's. What a model lacks is found as noise too: markers scatter about their bodies, which no
+    /// robot moves, and clearly more than that and what was stated is not the tracker's. Where the fit is known to lack an effect, nothing is that
+    /// is above what was stated, or above that scatter where nothing was.
+    pub(crate) fn beside_lacking(
+        fit: &'a MlFit,
+        inputs: &Inputs,
+        tracks: &BTreeMap<String, BodyTrack>,
+        lacking: bool,
+    ) -> Self {
+        let stated = inputs.robot.profile.tracker.marker_sigma;
+        let scatter = tracks.values().filter_map(|track| track.marker_sigma);
+        let scatter = scatter.reduce(f64::max);
+        // In units of the level that the fit began with.
+        let of_markers = match (stated, scatter) {
+            (None, Some(scatter)) => Some(scatter / MARKER_SIGMA),
+            (Some(stated), Some(scatter)) if !lacking => Some(f64::max(1.0, scatter / stated)),
+            _ => lacking.then_some(1.0),
+        };
+        let of_poses = lacking.then_some(1.0);
+        let above = if lacking { 1.0 } else { CLEARLY };
+        Self::with(fit, &|of_marker, found| {
+            let most = if of_marker { of_markers } else { of_poses };
+            let most = most.map_or(f64::INFINITY, |times| times * found.stated);
+            if found.sigma > above * most {
+                most
+            } else {
+                found.sigma
+            }
+        })
+    }
+
+    /// With levels, m, of markers or else of poses, from those that were found.
+    fn with(fit: &'a MlFit, of_level: &dyn Fn(bool, &NoiseEstimate) -> f64) -> Self {
+        let level = |group: GroupId, of_marker: bool| {
             let found = fit.solution.noise.iter().find(|n| n.id == group)?;
-            let most = if lacking { found.stated } else { f64::INFINITY };
-            Some(found.sigma.min(most).powi(2))
+            Some(of_level(of_marker, found).powi(2))
         };
         let (markers, bodies) = (markers(fit), bodies(fit));
         let mut by_subject = BTreeMap::new();
@@ -46,24 +86,24 @@ impl<'a> TrackerNoise<'a> {
                     }
                     for (point, (sum, count)) in shapes {
                         let name = markers.get(&point).copied();
-                        let variance = level(seen.noise_of(point));
+                        let variance = level(seen.noise_of(point), true);
                         by_subject.extend(name.zip(variance.map(|v| v * sum / count)));
                     }
                 }
                 MeasurementKind::Poses(seen) => {
                     if let PoseNoise::Split { position, .. } = seen.noise {
                         let name = bodies.get(&measurement.to).copied();
-                        by_subject.extend(name.zip(level(position)));
+                        by_subject.extend(name.zip(level(position, false)));
                     }
                 }
                 _ => {}
             }
         }
         let groups = fit.formulation.noise;
-        let of_markers = groups.marker.and_then(level);
+        let common = groups.marker.and_then(|g| level(g, true));
         Self {
             by_subject,
-            common: of_markers.or_else(|| groups.body_position.and_then(level)),
+            common: common.or_else(|| level(groups.body_position?, false)),
             samples: &fit.formulation.samples,
         }
     }

@@ -120,6 +120,9 @@ pub(super) fn remounted(points: &[Seen<'_>], body: &str) -> Option<Tried> {
         .map(|(a, b)| b - a)
         .sum::<Vector3<f64>>()
         / known().count().max(1) as f64;
+    if !is_rigid(&from, &to, sigma(points, left)) {
+        return None;
+    }
     let turned = rigid_registration(&from, &to, None).ok();
     Some(Tried {
         motion: Motion::Body(body.to_owned()),
@@ -129,6 +132,23 @@ pub(super) fn remounted(points: &[Seen<'_>], body: &str) -> Option<Tried> {
         sigma: sigma(points, left),
         angle: turned.map(|t| t.b_from_a.rotation.angle()),
         kept,
+    })
+}
+
+/// Whether places moved as one body: the distances between them, whose means have σ, m, stayed. Labels that were exchanged in some of the rows that
+/// were fitted put places where no marker is, and those that are right seem to have moved.
+fn is_rigid(from: &[Point3<f64>], to: &[Point3<f64>], sigma: f64) -> bool {
+    /// A distance has the noise of two means, and one of a few may be off by this many σ.
+    const CHANCE: f64 = 5.0;
+    /// Small errors of the places, beside a motion that is many times as large, are no reason to doubt the motion.
+    const LITTLE: f64 = 0.2;
+    let pairs = from.iter().zip(to);
+    let squares: f64 = pairs.clone().map(|(a, b)| (b - a).norm_squared()).sum();
+    let moved = (squares / from.len().max(1) as f64).sqrt();
+    let most = f64::max(CHANCE * sigma, LITTLE * moved);
+    pairs.enumerate().all(|(i, (a, b))| {
+        let mut others = from[..i].iter().zip(to);
+        others.all(|(c, d)| ((a - c).norm() - (b - d).norm()).abs() < most)
     })
 }
 

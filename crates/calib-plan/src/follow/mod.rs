@@ -111,19 +111,18 @@ impl<'a> Follow<'a> {
         let follow = Self::unchecked(known, options, plan, name)?;
         let reached = follow.reached()?;
         let then = [plan.sigma_before_mm, plan.sigma_after_mm].map(|s| s.map(|mm| mm * 1e-3));
-        for (then, now) in then.into_iter().zip([reached.sigma, reached.expected]) {
-            let same = match (then, now) {
-                (Some(then), Some(now)) => now < SAME * then && then < SAME * now,
-                (then, now) => then.is_none() && now.is_none(),
-            };
-            if !same {
-                return Err(PlanError::Outdated {
-                    file: name.to_owned(),
-                    profile: known.robot.file.clone(),
-                    then,
-                    now,
-                });
-            }
+        let now = [reached.sigma, reached.expected];
+        let same = |(then, now): (Option<f64>, Option<f64>)| match (then, now) {
+            (Some(then), Some(now)) => now < SAME * then && then < SAME * now,
+            (then, now) => then.is_none() && now.is_none(),
+        };
+        if !then.into_iter().zip(now).all(same) {
+            return Err(PlanError::Outdated {
+                file: name.to_owned(),
+                profile: known.robot.file.clone(),
+                then,
+                now,
+            });
         }
         Ok(follow)
     }

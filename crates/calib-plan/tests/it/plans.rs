@@ -845,6 +845,33 @@ fn surroundings_that_nothing_is_compared_with_come_first_among_the_notes() {
     ] {
         assert!(said.contains(part), "{said}");
     }
+    // However many other notes and links there are, and wherever it stands, it is the first and is not cut.
+    let mut many = plan.clone();
+    let other = |k: usize| Note::MountAssumed {
+        body: format!("body_{k}"),
+    };
+    many.notes = (0..12).map(other).chain(plan.notes.clone()).collect();
+    for note in &mut many.notes {
+        if let Note::SurroundingsUnchecked { links, .. } = note {
+            *links = (0..40).map(|k| format!("link_{k}")).collect();
+        }
+    }
+    let screen = terminal::summary(&many, "out");
+    let words: Vec<&str> = screen.split_whitespace().collect();
+    let (said, first) = (
+        words.join(" "),
+        screen.lines().find(|l| l.starts_with("note: ")),
+    );
+    assert!(
+        first.is_some_and(|l| l.contains("`plan.ground_mm`")),
+        "{screen}"
+    );
+    assert!(
+        said.contains("`link_2`, and 37 more. The plan may move them through. Give links"),
+        "{screen}"
+    );
+    assert!(screen.contains("more in plan.html"), "{screen}");
+    assert!(screen.lines().count() <= 24, "{screen}");
     let stated = planned(&six(Seen::Markers(4), "plan: {ground_mm: -900}\n"), &few(8));
     let checked = |n: &Note| !matches!(n, Note::SurroundingsUnchecked { .. });
     assert!(stated.notes.iter().all(checked));

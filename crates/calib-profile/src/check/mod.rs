@@ -80,6 +80,7 @@ fn hides((place, c): (Place, char)) -> Problem {
 }
 
 mod body;
+mod columns;
 mod contact;
 mod load;
 mod names;

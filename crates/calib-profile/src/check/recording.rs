@@ -55,6 +55,12 @@ impl Checker<'_> {
                 "add `reader: <reader>`, or remove the key; `calib plugins` lists readers",
             );
         }
+        if let Some(map) = &raw.columns {
+            self.column_map(&["recordings", name, "columns"], map);
+        }
+        if let Some(map) = raw.robot_log.as_ref().and_then(|log| log.columns.as_ref()) {
+            self.column_map(&["recordings", name, "robot_log", "columns"], map);
+        }
         let timing = raw.timing.as_ref().map(|timing| self.timing(name, timing));
         RecordingSpec {
             file: raw.file.clone(),

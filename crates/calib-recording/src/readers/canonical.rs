@@ -4,7 +4,7 @@ use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
 use crate::model::Recording;
 use crate::table::{Known, is_canonical, read_table};
-use crate::text::{Separator, cells};
+use crate::text::{Separator, cells, is_blank};
 use calib_finding::nearest_word;
 use std::io::BufReader;
 
@@ -43,6 +43,13 @@ pub(super) const NDI: Reader = Reader {
     read: |input, options| with_preset("ndi", input, options),
 };
 
+/// Whether a reader of this id reads tables, and with them everything that a column map says.
+pub(super) fn is_of_tables(id: &str) -> bool {
+    [&READER, &UR_RTDE, &FRANKA, &NDI]
+        .iter()
+        .any(|reader| reader.id == id)
+}
+
 fn has_columns(head: &[u8], wanted: &[&str]) -> bool {
     let line = header_line(head).unwrap_or("");
     wanted
@@ -75,7 +82,7 @@ fn header_line(head: &[u8]) -> Option<&str> {
         Err(error) => std::str::from_utf8(&head[..error.valid_up_to()]).ok()?,
     };
     text.lines()
-        .find(|line| !line.trim().is_empty() && !line.starts_with('#'))
+        .find(|line| !is_blank(line, Separator::guess(line)) && !line.starts_with('#'))
 }
 
 /// Several cells, none of them binary; or nothing but comments.

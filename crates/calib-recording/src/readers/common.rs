@@ -1,11 +1,12 @@
 //! What the readers of tracker files share: rows of numbers, three coordinates to a sample, unique names.
 
+use super::ReadOptions;
 use crate::error::{At, Placed, Problem};
 use crate::growth::push;
 use crate::model::{BodyStream, MarkerSample, MarkerStream};
 use crate::placeholder::{Placeholders, is_placeholder_point};
 use crate::table::UNIT_TOLERANCE;
-use crate::text::{Number, Separator, cells, not_a_number, number};
+use crate::text::{Number, Separator, cells, not_a_number, number, ragged};
 use calib_finding::{About, Fact, Finding, Subject, catalog};
 use calib_geometry::so3;
 use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Translation3, UnitQuaternion};
@@ -41,14 +42,7 @@ pub(super) fn numbers(
     }
     for (i, cell) in row.enumerate() {
         if !cell_value(line, columns + i, cell)?.is_nan() {
-            let found = cells(text, separator).count();
-            return Err((
-                At::Line(line),
-                Problem::Ragged {
-                    found,
-                    expected: columns,
-                },
-            ));
+            return Err((At::Line(line), ragged(text, separator, columns)));
         }
     }
     values.resize(columns, f64::NAN);
@@ -113,6 +107,8 @@ pub(super) struct MarkerTrack {
     pub columns: [usize; 3],
     /// The device computes these points instead of measuring them.
     pub filled: bool,
+    /// A sample at (0, 0, 0) is a measured point.
+    zero_is_a_point: bool,
     zeros: Vec<u64>,
     placeholders: Placeholders,
 }
@@ -130,6 +126,7 @@ impl MarkerTrack {
             stream,
             columns,
             filled,
+            zero_is_a_point: false,
             zeros: Vec::new(),
             placeholders: Placeholders::default(),
         }
@@ -157,6 +154,10 @@ impl MarkerTrack {
                 Triplet::Point(point) if self.filled => MarkerSample::Filled(point),
                 Triplet::Point(point) => MarkerSample::Measured(point),
                 Triplet::Lost => MarkerSample::Lost,
+                Triplet::Zero if self.zero_is_a_point && self.filled => {
+                    MarkerSample::Filled(Point3::origin())
+                }
+                Triplet::Zero if self.zero_is_a_point => MarkerSample::Measured(Point3::origin()),
                 Triplet::Zero => {
                     self.zeros.push(row);
                     MarkerSample::Lost
@@ -170,6 +171,15 @@ impl MarkerTrack {
         findings.extend(self.placeholders.findings());
         findings.extend(all_zero(Subject::marker(&self.stream.name), self.zeros));
         self.stream
+    }
+}
+
+/// Takes samples at (0, 0, 0) as the caller wants them taken.
+pub(super) fn take_zeros(markers: &mut [MarkerTrack], options: &ReadOptions) {
+    let map = options.columns.as_ref();
+    let zero_is_a_point = map.is_some_and(|map| map.zero_is_a_point);
+    for marker in markers {
+        marker.zero_is_a_point = zero_is_a_point;
     }
 }
 

@@ -29,7 +29,7 @@ impl<T: Read + Seek> Input for T {}
 pub struct ReadOptions {
     /// Id of the reader; found from the content when `None`.
     pub format: Option<String>,
-    /// Meaning of the columns of a table that is not ours; then the reader is the table reader.
+    /// Meaning of the columns of a table that is not ours; then the reader is the table reader, unless the map describes no columns.
     pub columns: Option<ColumnMap>,
     /// The axis that points up, for formats that do not say (`+Y`); recorded, nothing is turned.
     pub up_axis: Option<String>,
@@ -229,6 +229,41 @@ fn read_placed(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording
     Ok(recording)
 }
 
+/// The reader, when it can do what a map asks that describes no columns.
+fn takes(reader: &'static Reader, map: &ColumnMap) -> Placed<&'static Reader> {
+    if canonical::is_of_tables(reader.id) {
+        return Ok(reader);
+    }
+    if let Some(label) = map.labels.first() {
+        let problem = Problem::MissingColumn {
+            what: "a label".to_string(),
+            column: label.clone(),
+            nearest: None,
+        };
+        return Err((At::File, problem));
+    }
+    let default = ColumnMap::default();
+    let given = [
+        ("lost", map.lost != default.lost),
+        ("decimal_comma", map.decimal_comma),
+        ("angles", map.angles != default.angles),
+        ("lengths", map.lengths != default.lengths),
+    ];
+    match given.iter().find(|(_, given)| *given) {
+        None => Ok(reader),
+        Some((key, _)) => Err((
+            At::File,
+            Problem::Unsupported {
+                what: format!(
+                    "`columns: {{{key}: …}}` for a file of format {}",
+                    reader.name
+                ),
+                remedy: format!("remove `{key}` from the profile: the format itself states it"),
+            },
+        )),
+    }
+}
+
 fn choose(head: &[u8], options: &ReadOptions) -> Placed<&'static Reader> {
     let known = || {
         readers()
@@ -254,10 +289,13 @@ fn choose(head: &[u8], options: &ReadOptions) -> Placed<&'static Reader> {
                 )
             });
     }
-    if options.columns.is_some() {
-        return Ok(&canonical::READER);
+    let detected = || readers().iter().find(|reader| (reader.detect)(head));
+    match &options.columns {
+        Some(map) if map.describes_columns() => return Ok(&canonical::READER),
+        Some(map) => return detected().map_or(Ok(&canonical::READER), |r| takes(r, map)),
+        None => {}
     }
-    if let Some(reader) = readers().iter().find(|reader| (reader.detect)(head)) {
+    if let Some(reader) = detected() {
         return Ok(reader);
     }
     // A table with a header of text, though not of our names: read it as ours, whose message names the column.

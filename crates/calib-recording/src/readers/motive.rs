@@ -15,7 +15,7 @@
 //! The file does not say which axis is up (Y unless changed at export).
 
 use super::common::{
-    Instants, MarkerTrack, Triplet, body_stream, first_cell, numbers, pose, quaternion,
+    Instants, MarkerTrack, Triplet, body_stream, first_cell, numbers, pose, quaternion, take_zeros,
     tracker_clock, triplet, unexpected, unique_names,
 };
 use super::{Input, ReadOptions, Reader};
@@ -83,6 +83,7 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
     let header = Header::read(&mut lines)?;
     let rotation_type = value("Rotation Type").unwrap_or("Quaternion");
     let mut tracks = plan(&header, rotation_type, &mut recording)?;
+    take_zeros(&mut tracks.markers, options);
     if tracks.markers.is_empty() && tracks.bodies.is_empty() {
         return unexpected(
             header.line,

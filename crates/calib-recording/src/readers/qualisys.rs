@@ -7,7 +7,8 @@
 
 use super::common::{
     Instants, MarkerTrack, Triplet, all_zero, body_stream, frame_count_differs, head_text,
-    is_frame_number, numbers, pose, rotation, tracker_clock, triplet, unexpected, unique_names,
+    is_frame_number, numbers, pose, rotation, take_zeros, tracker_clock, triplet, unexpected,
+    unique_names,
 };
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
@@ -89,6 +90,7 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
     let lead = header.lead(&first_row);
     let mut recording = Recording::default();
     let mut tracks = Tracks::plan(&header, lead, &mut recording.meta.findings);
+    take_zeros(&mut tracks.markers, options);
     if lead != 2 && header.rate.is_none() {
         recording
             .meta

@@ -11,8 +11,8 @@
 //! The numbers of frames and markers in the header are often wrong; the columns count.
 
 use super::common::{
-    Instants, MarkerTrack, first_cell, frame_count_differs, numbers, tracker_clock, unexpected,
-    unique_names,
+    Instants, MarkerTrack, first_cell, frame_count_differs, numbers, take_zeros, tracker_clock,
+    unexpected, unique_names,
 };
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
@@ -43,6 +43,7 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
     };
     let mut findings = Vec::new();
     let mut markers = header.markers(&mut findings)?;
+    take_zeros(&mut markers, options);
     let instants = read_rows(&mut lines, header.separator, &mut markers, unit)?;
     let promised = header
         .field("NumFrames")

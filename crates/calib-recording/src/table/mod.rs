@@ -6,7 +6,7 @@ mod rows;
 mod write;
 mod write_mapped;
 
-pub(crate) use header::{Known, is_canonical};
+pub(crate) use header::{Known, is_canonical, length_unit};
 pub use read::WRITTEN_LIVE;
 pub(crate) use read::read_table;
 pub(crate) use rows::UNIT_TOLERANCE;

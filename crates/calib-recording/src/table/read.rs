@@ -5,7 +5,7 @@ use super::rows::Rows;
 use crate::column_map::{ColumnMap, Delimiter};
 use crate::error::{At, Placed, Problem};
 use crate::model::Recording;
-use crate::text::{Lines, Separator, cells, unquoted};
+use crate::text::{Lines, Separator, cells, is_blank, unquoted};
 use calib_finding::{Finding, Subject, catalog};
 use std::io::BufRead;
 
@@ -28,7 +28,7 @@ pub(crate) fn read_table(
     };
     let mut rows = Rows::new(layout, separator, map);
     let live = comments.iter().any(|comment| comment == WRITTEN_LIVE);
-    let mut cut = None;
+    let (mut cut, mut blank) = (None, Vec::new());
     loop {
         let number = lines.number() + 1;
         let Some((line, whole)) = lines.next_whole()? else {
@@ -40,7 +40,15 @@ pub(crate) fn read_table(
         }
         if let Some(comment) = line.strip_prefix('#') {
             comments.push(comment.trim().to_string());
-        } else if !line.bytes().all(|b| b.is_ascii_whitespace()) {
+        } else if is_blank(line, separator) {
+            // At the end of a table nothing follows that such a row could stand before.
+            if !line.trim().is_empty() && rows.blank_is_a_sample() {
+                blank.push((number, line.to_owned()));
+            }
+        } else {
+            for (number, line) in blank.drain(..) {
+                rows.read(number, &line)?;
+            }
             rows.read(number, line)?;
         }
     }
@@ -93,8 +101,10 @@ fn read_header<R: BufRead>(
             .filter(|_| !map_names_start_with_hash(map))
         {
             comments.push(comment.trim().to_string());
-        } else if !line.trim().is_empty() {
-            let separator = given.unwrap_or_else(|| Separator::guess(line));
+            continue;
+        }
+        let separator = given.unwrap_or_else(|| Separator::guess(line));
+        if !is_blank(line, separator) {
             let names = cells(line, separator).map(unquoted).collect();
             return Ok(Some((Layout::new(number, names, (map, known))?, separator)));
         }

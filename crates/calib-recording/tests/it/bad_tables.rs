@@ -201,7 +201,9 @@ fn a_mapped_column_that_ends_in_a_unit_has_that_unit() {
     }
     let message = read(AngleUnit::Rad, LengthUnit::Cm).expect_err("two units");
     assert!(
-        message.to_string().contains("`t_mm` and `lengths: cm`"),
+        message
+            .to_string()
+            .contains("`lengths: cm` in the column map contradicts the name of column `t_mm`"),
         "{message}"
     );
 }

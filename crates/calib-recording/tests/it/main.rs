@@ -2,8 +2,10 @@
 
 mod bad_tables;
 mod bags;
+mod blank_rows;
 mod fixtures;
 mod fuzz_seeds;
+mod map_faults;
 mod mapped;
 mod mutations;
 mod real_formats;

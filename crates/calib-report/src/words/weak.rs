@@ -8,7 +8,7 @@ impl RobotSize {
     #[must_use]
     pub fn sentence(&self) -> String {
         format!(
-            "The size of the robot: ±{}, {} at the reach of {}; {} of this is determined by the priors.",
+            "The size of the robot, in the tracker's unit of length: ±{}, {} at the reach of {}; {} of this is determined by the priors.",
             relative(self.sigma),
             number::plain(self.at_reach_m(), Unit::Meter),
             number::plain(self.reach_m, Unit::Meter),

@@ -334,6 +334,17 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
                 f.improvements = vec![improvement(0.0006, 0.0005, 0.2, 0.8)];
             }),
         ),
+        // Orientations that became worse by more than positions became better.
+        (
+            ReasonId::NotBetterThanRegistration,
+            Warns,
+            with(|f| {
+                f.improvements.push(Improvement {
+                    quantity: Compared::Orientation,
+                    ..improvement(0.001, 0.01, 1.0, 0.001)
+                });
+            }),
+        ),
         (
             ReasonId::TooFewToCompare,
             Warns,

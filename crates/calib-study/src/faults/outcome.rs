@@ -187,9 +187,10 @@ impl CaseResult {
 }
 
 /// Findings that name a cause.
-const NAMES: [&str; 22] = [
+const NAMES: [&str; 23] = [
     "joint-sign",
     "joint-axis",
+    "tracker-scale",
     "joint-order",
     "unit-mismatch",
     "joint-coupling",

@@ -17,7 +17,7 @@ use crate::prepare::mixed::Mixed;
 use crate::prepare::tracks::BodyTrack;
 
 /// Marker noise that estimation starts from where the profile states none, m.
-const MARKER_SIGMA: f64 = 0.5e-3;
+pub(crate) const MARKER_SIGMA: f64 = 0.5e-3;
 /// Body position noise that estimation starts from, m.
 const BODY_SIGMA: f64 = 0.5e-3;
 /// Body orientation noise that estimation starts from, rad (0.2°).
@@ -30,7 +30,7 @@ pub(super) fn add_bodies(
 ) {
     let profile = &inputs.robot.profile;
     let as_pose =
-        |name: &String| profile.bodies[name].kind == BodyKind::Pose || tracks[name].is_computed();
+        |name: &String| profile.bodies[name].kind == BodyKind::Pose || tracks[name].is_computed;
     let levels = levels(formulation, inputs, &as_pose);
     let only = levels.len() == 1;
     for (name, body) in &profile.bodies {

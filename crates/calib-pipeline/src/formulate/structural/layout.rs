@@ -101,7 +101,7 @@ impl<'a> Layout<'a> {
     fn measured(&self, kind: &BodyKind, track: &BodyTrack) -> Option<Measured> {
         let places = || self.data.recording.iter().zip(&self.rows);
         match kind {
-            BodyKind::Markers { names, .. } if !track.is_computed() => {
+            BodyKind::Markers { names, .. } if !track.is_computed => {
                 let at = |marker: &String, r: &RecordingIndex, row: usize| -> Option<Point3<f64>> {
                     *self.recordings[r.0].poses.markers.get(marker)?.get(row)?
                 };

@@ -18,7 +18,7 @@ mod body;
 
 use super::common::{
     MarkerTrack, all_zero, body_stream, first_cell, head_text, is_frame_number, numbers,
-    tracker_clock, unexpected, unique_names,
+    take_zeros, tracker_clock, unexpected, unique_names,
 };
 use super::{Input, ReadOptions, Reader, RotationForm};
 use crate::error::{At, Placed, Problem};
@@ -443,6 +443,7 @@ impl Columns<'_> {
             "m"
         };
         conversions.push(format!("lengths from {unit}"));
+        take_zeros(&mut tracks.markers, options);
         Ok(tracks)
     }
 

@@ -4,6 +4,7 @@ use super::naming::length_unit;
 use super::{BodyPlan, Column, Layout, MarkerPlan, Rotation, SlotKind};
 use crate::column_map::{BodyColumns, ColumnMap, LongColumns};
 use crate::error::Problem;
+use crate::map_fault::{MapFault, StatedUnits, angle_unit};
 use crate::model::JointUnit;
 use crate::units::{AngleUnit, LengthUnit};
 use calib_finding::nearest_word;
@@ -14,6 +15,9 @@ pub(super) fn apply(
     map: &ColumnMap,
     mapped: &mut [bool],
 ) -> Result<(), Problem> {
+    if let Some(fault) = map.faults(StatedUnits::default()).into_iter().next() {
+        return Err(Problem::ColumnMap(fault));
+    }
     let mut columns = Mapping {
         layout,
         mapped,
@@ -47,14 +51,6 @@ pub(super) fn apply(
     Ok(())
 }
 
-/// A column whose name ends in another unit than the map states.
-fn contradicts(column: &str, stated: &str) -> Problem {
-    Problem::Misfit {
-        found: format!("the name of column `{column}` and `{stated}` in the column map differ"),
-        expected: "one unit: correct the map, or the name of the column".to_string(),
-    }
-}
-
 /// A layout while a map is applied.
 struct Mapping<'a> {
     layout: &'a mut Layout,
@@ -80,7 +76,7 @@ impl Mapping<'_> {
             })
     }
 
-    /// The slot of a column of numbers that nothing else may use.
+    /// The slot of a column of numbers; the map uses it once.
     fn take(
         &mut self,
         what: &str,
@@ -89,12 +85,6 @@ impl Mapping<'_> {
         scale: f64,
     ) -> Result<usize, Problem> {
         let i = self.position(what, column)?;
-        if self.mapped[i] {
-            return Err(Problem::Misfit {
-                found: format!("the map uses column `{column}` again for {what}"),
-                expected: "every column once".to_string(),
-            });
-        }
         self.mapped[i] = true;
         Ok(self.layout.slot(i, kind, scale))
     }
@@ -104,35 +94,25 @@ impl Mapping<'_> {
         &mut self,
         what: &str,
         columns: &[String; 3],
-        scale: impl Fn(&Self, &str) -> Result<f64, Problem>,
+        scale: impl Fn(&Self, &str) -> f64,
     ) -> Result<[usize; 3], Problem> {
         let mut slots = [0; 3];
         for (slot, column) in slots.iter_mut().zip(columns) {
-            let scale = scale(self, column)?;
+            let scale = scale(self, column);
             *slot = self.take(what, column, SlotKind::Tracker, scale)?;
         }
         Ok(slots)
     }
 
     /// Units per radian of a column: of its name where that ends in a unit, else of the map.
-    fn angles(&self, column: &str) -> Result<f64, Problem> {
-        match column.rsplit_once('_').map(|(_, unit)| unit) {
-            Some("deg") => Ok(AngleUnit::Deg.per_radian()),
-            Some("rad") if self.angle == AngleUnit::Deg => Err(contradicts(column, "angles: deg")),
-            _ => Ok(self.angle.per_radian()),
-        }
+    fn angles(&self, column: &str) -> f64 {
+        angle_unit(column).unwrap_or(self.angle).per_radian()
     }
 
     /// Units per meter of a column: of its name where that ends in a unit, else of the map.
-    fn lengths(&self, column: &str) -> Result<f64, Problem> {
-        match length_unit(column).map(|(_, unit)| unit) {
-            Some(own) if own == self.length || self.length == LengthUnit::M => Ok(own.per_meter()),
-            Some(_) => {
-                let stated = format!("lengths: {}", self.length.name());
-                Err(contradicts(column, &stated))
-            }
-            None => Ok(self.length.per_meter()),
-        }
+    fn lengths(&self, column: &str) -> f64 {
+        let own = length_unit(column).map(|(_, unit)| unit);
+        own.unwrap_or(self.length).per_meter()
     }
 
     /// Joints, torques and temperatures.
@@ -147,14 +127,6 @@ impl Mapping<'_> {
         }
         for (joint, column) in &map.prismatic {
             self.joint(joint, column, JointUnit::Length, sign(joint))?;
-        }
-        let joints = &self.layout.joints;
-        let unknown = |name: &&String| !joints.iter().any(|(joint, ..)| joint == *name);
-        if let Some(name) = map.reversed.iter().find(unknown) {
-            return Err(Problem::Misfit {
-                found: format!("`reversed` names `{name}`, which is not among the map's joints"),
-                expected: format!("`joints: {{{name}: <column>}}` beside it"),
-            });
         }
         for (joint, column) in &map.torques {
             let what = format!("torque of `{joint}`");
@@ -178,8 +150,8 @@ impl Mapping<'_> {
         sign: f64,
     ) -> Result<(), Problem> {
         let per_unit = match unit {
-            JointUnit::Angle => self.angles(column)?,
-            JointUnit::Length => self.lengths(column)?,
+            JointUnit::Angle => self.angles(column),
+            JointUnit::Length => self.lengths(column),
         };
         let scale = sign * per_unit;
         let what = format!("joint `{joint}`");
@@ -242,8 +214,7 @@ impl Mapping<'_> {
                 fixed_xyz: None,
                 ..
             } => {
-                let [x, y, z] =
-                    self.three(what, &[x.clone(), y.clone(), z.clone()], |_, _| Ok(1.0))?;
+                let [x, y, z] = self.three(what, &[x.clone(), y.clone(), z.clone()], |_, _| 1.0)?;
                 let i = self.position(what, w)?;
                 let w = self.layout.slot(i, SlotKind::Tracker, 1.0);
                 Ok(Rotation::Quaternion([x, y, z, w]))
@@ -266,11 +237,10 @@ impl Mapping<'_> {
                 columns,
                 Self::angles,
             )?)),
-            _ => Err(Problem::Misfit {
-                found: format!("the column map gives {what} none or several rotations"),
-                expected: "one of quaternion_xyzw, quaternion_wxyz, rotation_vector, fixed_xyz"
-                    .to_string(),
-            }),
+            _ => Err(Problem::ColumnMap(MapFault::Rotations {
+                path: vec![what.to_string()],
+                count: columns.rotation_count(),
+            })),
         }
     }
 
@@ -282,13 +252,6 @@ impl Mapping<'_> {
         layout.entity = Some(name);
         layout.columns[name] = Column::Entity;
         layout.counter = Some(layout.slot(frame, SlotKind::Counter, 1.0));
-        if layout.markers.len() + layout.bodies.len() != 1 {
-            return Err(Problem::Misfit {
-                found: "the column map's `long` has none or several kinds of columns".to_string(),
-                expected: "either `marker` or `body` under `long`, and no other markers or bodies"
-                    .to_string(),
-            });
-        }
         Ok(())
     }
 

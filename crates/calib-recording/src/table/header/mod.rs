@@ -5,7 +5,7 @@ mod mapped;
 mod naming;
 mod rules;
 
-pub(crate) use naming::{JOINT, is_canonical, reads_as_joint};
+pub(crate) use naming::{JOINT, is_canonical, length_unit, reads_as_joint};
 
 use crate::column_map::ColumnMap;
 use crate::error::{At, Placed, Problem};

@@ -50,7 +50,7 @@ fn part(text: &str) -> Option<(Part, f64)> {
 }
 
 /// The name of a column without its unit of length, and the unit. `in` and `ft` are words as well (`plug_in`): they are units behind a coordinate only.
-pub(super) fn length_unit(column: &str) -> Option<(&str, LengthUnit)> {
+pub(crate) fn length_unit(column: &str) -> Option<(&str, LengthUnit)> {
     let (stem, unit) = column.rsplit_once('_')?;
     let unit = LengthUnit::from_name(unit)?;
     let word = matches!(unit, LengthUnit::In | LengthUnit::Ft);

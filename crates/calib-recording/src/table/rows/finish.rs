@@ -8,6 +8,7 @@ use crate::model::{
 };
 use crate::placeholder::{equal, repeated, repeated_finding};
 use calib_finding::{Fact, Finding, Subject, catalog};
+use std::collections::{BTreeMap, BTreeSet};
 
 impl Rows<'_> {
     /// The recording of all rows.
@@ -146,14 +147,25 @@ impl Rows<'_> {
                     .with("samples", Fact::count(rows.len()))
                     .at_rows(rows)
             });
-        let nans = std::mem::take(&mut self.nans)
-            .into_iter()
-            .map(|(column, rows)| {
-                Finding::of_kind(catalog::NOT_A_NUMBER, "cells", Subject::column(column))
-                    .with("count", Fact::count(rows.len()))
-                    .at_rows(rows)
-            });
         let placeholders = self.placeholders.findings();
-        zeros.chain(placeholders).chain(nans).collect()
+        zeros
+            .chain(placeholders)
+            .chain(not_numbers(&self.nans))
+            .collect()
     }
+}
+
+/// The finding about cells of the tracker that say that they hold no number: one for all columns.
+fn not_numbers(nans: &BTreeMap<String, Vec<u64>>) -> Option<Finding> {
+    let subject = match nans.keys().next() {
+        Some(column) if nans.len() == 1 => Subject::column(column),
+        _ => Subject::default(),
+    };
+    let cells: usize = nans.values().map(Vec::len).sum();
+    let rows: BTreeSet<u64> = nans.values().flatten().copied().collect();
+    (cells > 0).then(|| {
+        Finding::of_kind(catalog::NOT_A_NUMBER, "cells", subject)
+            .with("count", Fact::count(cells))
+            .at_rows(rows)
+    })
 }

@@ -8,13 +8,13 @@ mod sample;
 pub(crate) use sample::UNIT_TOLERANCE;
 
 use self::of_pose::PoseRows;
-use super::header::{Column, Layout};
+use super::header::{Column, Layout, SlotKind};
 use crate::column_map::ColumnMap;
 use crate::error::{At, Placed, Problem, excerpt};
 use crate::growth::push;
 use crate::model::{MarkerSample, Timeline};
 use crate::placeholder::Placeholders;
-use crate::text::{Number, Separator, cells, number, unquoted};
+use crate::text::{Number, Separator, cells, number, ragged, unquoted};
 use nalgebra::Isometry3;
 use std::collections::BTreeMap;
 
@@ -104,6 +104,14 @@ impl<'a> Rows<'a> {
         self.timeline.rows.is_empty()
     }
 
+    /// Whether a row without anything in it is a sample: the rows have no time and no number, and belong by their place to those of another file.
+    pub(super) fn blank_is_a_sample(&self) -> bool {
+        let layout = &self.layout;
+        let of = |kind: SlotKind| layout.slots.iter().any(|slot| slot.kind == kind);
+        let placed = of(SlotKind::Time) || of(SlotKind::Counter) || layout.entity.is_some();
+        !(placed || of(SlotKind::Robot) && of(SlotKind::Tracker))
+    }
+
     fn at(&self, line: u64, column: usize) -> At {
         let name = self
             .layout
@@ -168,13 +176,7 @@ impl<'a> Rows<'a> {
             }
         }
         if found != header {
-            return Err((
-                At::Line(line),
-                Problem::Ragged {
-                    found,
-                    expected: header,
-                },
-            ));
+            return Err((At::Line(line), ragged(text, self.separator, header)));
         }
         self.instant(line)?;
         if self.layout.entity.is_some() {

@@ -71,6 +71,9 @@ pub(super) const SIGNIFICANT: f64 = 0.05;
 /// all postures at once, and is truly a little worse in half of the cases. Eight postures, all of them worse, are as rare as this.
 const REJECTS: f64 = 0.005;
 
+/// Beside a quantity that is better, one that is worse by less than this, or than the other is better, is no loss.
+const LOSS: f64 = 1.05;
+
 /// The smallest p of a test that exchanges the signs of so many differences.
 fn least_p(postures: usize) -> f64 {
     0.5_f64.powi(postures.try_into().unwrap_or(i32::MAX))
@@ -83,10 +86,20 @@ pub(super) fn registration(facts: &Facts) -> Vec<Reason> {
     // Without a statement of its uncertainty, the comparison is all there is.
     let stated = facts.agreement.as_ref();
     let beyond = stated.is_none_or(crate::Agreement::is_beyond);
-    let rejecting = |i: &&Improvement| beyond && i.p_worse < REJECTS;
+    let better = facts
+        .improvements
+        .iter()
+        .filter(|i| i.p_better < SIGNIFICANT);
+    let gain = better.map(|i| i.registration / i.calibrated);
+    let gain = gain.reduce(f64::max);
+    let better = gain.is_some();
+    // What cannot become better, as the orientation of a robot that only slides or of a small body, differs by little, and yet always in the same sense.
+    let counts =
+        |i: &Improvement| gain.is_none_or(|gain| i.calibrated > LOSS.max(gain) * i.registration);
+    let rejecting = |i: &&Improvement| beyond && i.p_worse < REJECTS && counts(i);
     let rejecting = facts.improvements.iter().find(rejecting);
-    let worse = facts.improvements.iter().find(|i| i.p_worse < SIGNIFICANT);
-    let better = facts.improvements.iter().any(|i| i.p_better < SIGNIFICANT);
+    let worse = |i: &&Improvement| i.p_worse < SIGNIFICANT && counts(i);
+    let worse = facts.improvements.iter().find(worse);
     let (id, effect, shown) = match (rejecting.or(worse), better) {
         (Some(worse), _) if rejecting.is_some() => {
             (ReasonId::WorseThanRegistration, Effect::Rejects, worse)

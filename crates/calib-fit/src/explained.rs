@@ -1,0 +1,172 @@
+//! Whether one axis or center explains the motion at all.
+//!
+//! ```text
+//! s² = Σ |x − x̄|² / (3n),   q = rms / s                                                                (1)
+//! ```
+//!
+//! x: places of a marker, over the rows that were not rejected; for poses, those of the body's origin and of three points 100 mm from it along
+//! its axes; s: spread of the motion, one coordinate; rms: that of the estimate's residuals, one coordinate. With a stated noise σ of one
+//! coordinate (of stated covariances their mean), an answer is refused where
+//!
+//! ```text
+//! rms > 3 σ   and   q > 0.2,   or   rms > 10 σ   and   q > 0.05                                          (2)
+//! ```
+//!
+//! and without one where q > 0.2. Random postures of an arm leave q of 0.25 to 0.7; a sweep of a joint with millimeters of backlash, below 0.05.
+
+use nalgebra::{Matrix3, Point3, Vector3};
+
+use calib_cor::Pose;
+
+use crate::TableRequest;
+use crate::table::Table;
+
+/// Residuals above this part of the motion are not noise about an axis or a center, unless so large a noise is stated.
+const UNEXPLAINED: f64 = 0.2;
+/// The same, where the residuals are far beyond what is stated.
+const BEYOND_NOISE: f64 = 0.05;
+/// Residuals up to this multiple of a stated noise are that noise: those of poses hold the orientation's share as well.
+const STATED: f64 = 3.0;
+/// Residuals above this multiple of a stated noise are no underestimate of it.
+const FAR_BEYOND: f64 = 10.0;
+/// Points that stand for a body without markers, m from its origin.
+const LEVER: f64 = 0.1;
+
+/// Residuals that are no noise about an axis or a center.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Unexplained {
+    /// Residuals, rms, m.
+    rms: f64,
+    /// Spread of the motion, rms of one coordinate, m.
+    spread: f64,
+    /// Largest part of it that residuals may have.
+    limit: f64,
+    /// Noise that was stated, m.
+    stated: Option<f64>,
+}
+
+impl Unexplained {
+    /// The end of an answer's first line, before the estimate. `what`: axis or center.
+    pub fn head(&self, what: &str) -> String {
+        format!(
+            "{}\n  help: {}\n  the best fit nevertheless:",
+            self.reason(what),
+            self.remedy(what)
+        )
+    }
+
+    /// `what`: axis or center.
+    pub fn reason(&self, what: &str) -> String {
+        let mm = |x: f64| x * 1e3;
+        let stated = self.stated.map_or_else(String::new, |s| {
+            format!(", and {:.0} times the stated noise", self.rms / s)
+        });
+        format!(
+            "no single {what} explains the points: the residuals of {:.2} mm rms are {:.0} % of their motion of {:.2} mm rms (limit {:.0} %){stated}",
+            mm(self.rms),
+            100.0 * self.rms / self.spread,
+            mm(self.spread),
+            100.0 * self.limit
+        )
+    }
+
+    /// What to do.
+    fn remedy(&self, what: &str) -> String {
+        let recording = match what {
+            "axis" => {
+                "Record a sweep of one joint with all others at rest, or give both sides of the joint with --parent and --child."
+            }
+            _ => {
+                "Record a motion about one center, or give both sides of the joint with --parent and --child."
+            }
+        };
+        match self.stated {
+            None => format!(
+                "{recording} If the tracker is that noisy, state its noise with --sigma-mm."
+            ),
+            Some(_) => recording.to_owned(),
+        }
+    }
+}
+
+/// (2). `rejected`: numbers of the rows in the table's file.
+pub(crate) fn unexplained(
+    request: &TableRequest,
+    table: &Table,
+    rms: f64,
+    rejected: &[u64],
+) -> Option<Unexplained> {
+    let spread = spread(table, rejected);
+    let stated = mean_noise(&table.covariances).or(request.sigma_m);
+    let limit = match stated.map(|s| rms / s) {
+        Some(times) if times <= STATED => return None,
+        Some(times) if times > FAR_BEYOND => BEYOND_NOISE,
+        _ => UNEXPLAINED,
+    };
+    (rms > limit * spread).then_some(Unexplained {
+        rms,
+        spread,
+        limit,
+        stated,
+    })
+}
+
+/// One coordinate's noise of stated covariances, m.
+fn mean_noise(covariances: &[Vec<Matrix3<f64>>]) -> Option<f64> {
+    let all = covariances.iter().flatten();
+    let (sum, n) = all.fold((0.0, 0.0), |(s, n), c| (s + c.trace() / 3.0, n + 1.0));
+    (n > 0.0).then(|| f64::sqrt(sum / n))
+}
+
+/// (1).
+fn spread(table: &Table, rejected: &[u64]) -> f64 {
+    let tracks = match (&table.pair, &table.body) {
+        (Some([parent, child]), _) => {
+            let child_in_parent = parent.iter().zip(child).map(|(parent, child)| {
+                let (parent, child) = (parent.as_ref()?, child.as_ref()?);
+                let parent_from_world = parent.rotation.transpose();
+                Some(Pose {
+                    rotation: parent_from_world * child.rotation,
+                    translation: parent_from_world * (child.translation - parent.translation),
+                })
+            });
+            points_of(&child_in_parent.collect::<Vec<_>>())
+        }
+        (None, Some(body)) if table.origin_only => points_of(body),
+        _ => table.tracks(),
+    };
+    let (mut squares, mut count) = (0.0, 0);
+    for track in &tracks {
+        let rows = track.iter().zip(&table.rows);
+        let used: Vec<&Point3<f64>> = rows
+            .filter(|(_, row)| !rejected.contains(row))
+            .filter_map(|(point, _)| point.as_ref())
+            .collect();
+        let mean = used.iter().map(|p| p.coords).sum::<Vector3<f64>>() / used.len().max(1) as f64;
+        squares += used
+            .iter()
+            .map(|p| (p.coords - mean).norm_squared())
+            .sum::<f64>();
+        count += used.len();
+    }
+    f64::sqrt(squares / (3 * count.max(1)) as f64)
+}
+
+/// Its origin and a point on each axis.
+fn points_of(body: &[Option<Pose>]) -> Vec<Vec<Option<Point3<f64>>>> {
+    let points = [
+        Vector3::zeros(),
+        Vector3::x() * LEVER,
+        Vector3::y() * LEVER,
+        Vector3::z() * LEVER,
+    ];
+    let place = |pose: &Pose, p: &Vector3<f64>| Point3::from(pose.rotation * p + pose.translation);
+    points
+        .iter()
+        .map(|p| {
+            body.iter()
+                .map(|b| b.as_ref().map(|b| place(b, p)))
+                .collect()
+        })
+        .collect()
+}

@@ -1,0 +1,58 @@
+//! What stands in the text where the YAML reader stops: values that a person writes and YAML reads as something else.
+
+use crate::locate::Place;
+
+/// The line of a place up to it, and from it on.
+fn around(text: &str, place: Place) -> Option<(&str, &str)> {
+    let line = text.lines().nth(place.line.checked_sub(1)?)?;
+    let (at, _) = line.char_indices().nth(place.column.checked_sub(1)?)?;
+    Some(line.split_at(at))
+}
+
+/// Digits at the start.
+fn leading_digits(text: &str) -> &str {
+    let end = text.find(|c: char| !c.is_ascii_digit());
+    &text[..end.unwrap_or(text.len())]
+}
+
+/// A number with a decimal comma that begins at the place, or whose digits behind the comma do: as it is written, and with a point.
+pub(crate) fn decimal_comma(text: &str, place: Place) -> Option<(String, String)> {
+    let (before, from) = around(text, place)?;
+    let number = |whole: &str, decimals: &str| {
+        let given =
+            !leading_digits(whole.trim_start_matches('-')).is_empty() && !decimals.is_empty();
+        given.then(|| (format!("{whole},{decimals}"), format!("{whole}.{decimals}")))
+    };
+    if let Some(value) = before.strip_suffix(',') {
+        let digits = value.trim_end_matches(|c: char| c.is_ascii_digit());
+        let begins = digits.trim_end_matches('-');
+        let whole = value.get(begins.len()..)?;
+        // `0.2,7` is a number and a key.
+        begins.ends_with([' ', ':', '[']).then_some(())?;
+        return number(whole, leading_digits(from));
+    }
+    let quoted = from.trim_start_matches(['"', '\'']);
+    let (whole, decimals) = quoted.split_once(',')?;
+    let digits = whole.trim_start_matches('-');
+    (leading_digits(digits) == digits).then_some(())?;
+    number(whole, leading_digits(decimals))
+}
+
+/// The plain text that begins at the place, without quotes.
+pub(crate) fn plain(text: &str, place: Place) -> Option<&str> {
+    let (_, from) = around(text, place)?;
+    let end = from.find([',', '}', ']', '#']).unwrap_or(from.len());
+    let plain = from[..end].trim().trim_matches(['"', '\'']);
+    (!plain.is_empty()).then_some(plain)
+}
+
+/// The map of a column of time, with the unit by its name.
+pub(crate) fn time_column(column: &str) -> String {
+    let unit = column
+        .rsplit(['_', '.', '[', '('])
+        .next()
+        .unwrap_or_default();
+    let unit = unit.trim_end_matches([']', ')']);
+    let unit = ["ms", "us", "ns"].into_iter().find(|known| *known == unit);
+    format!("time: {{column: {column}, unit: {}}}", unit.unwrap_or("s"))
+}
