@@ -4,7 +4,7 @@
 //! (H + λ S⁻²) δ = −g,   x ⊞ δ accepted when F falls;   stop when −gᵀδ (in σ²) vanishes          (1)
 //! ```
 //!
-//! S holds the parameters' natural scales ([`natural`]): what makes a linearization wrong is the size
+//! S holds the parameters' natural scales (prior σ, or 1°, 1 cm): what makes a linearization wrong is the size
 //! of a step in degrees, not in units of the data's precision, so weakly seen directions are held back first.
 //!
 //! Directions that neither data nor prior see have zero gradient and stay where they start. A prior that is very wide says
@@ -37,7 +37,6 @@ use crate::solve::bounded::{Damped, bounded_step};
 use crate::solve::contraction::{Contraction, both};
 use crate::solve::curvature::Curvature;
 use crate::solve::equations::{NormalEquations, Objective, Workspace};
-use crate::solve::natural::natural;
 use crate::solve::normal::{accumulate, cost};
 use crate::solve::step::{damped_step, retract};
 
@@ -45,7 +44,8 @@ use crate::solve::step::{damped_step, retract};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SolveStatus {
-    /// The gradient vanishes: a further step would change the fit by less than 1e-6 σ.
+    /// The gradient vanishes: a further step would change the fit by less than 1e-6 σ. Or what is left is to creep along a direction that hardly any
+    /// data see, by less than 0.1 σ in all.
     Converged,
     /// No step lowers the cost although the gradient has not vanished: rounding, or a kink.
     Stalled,
@@ -109,8 +109,16 @@ const CREEPING: f64 = 0.8;
 const LITTLE: f64 = 1e-2;
 /// …while no prediction moves by more than this, squared: 1e-3 σ.
 const UNSEEN_IN_ALL: f64 = 1e-6;
+/// Where the allowed steps are used up, it is enough that predictions would move by no more than this in all, squared: a tenth of what chance does
+/// along any direction.
+const UNSEEN_AT_LAST: f64 = 1e-2;
 /// In a curved valley long steps alternate with short ones: a step is compared with the last one of the same damping, so many steps ago at most.
 const PERIOD: usize = 4;
+/// A prior wider than this many typical deviations does not say how far a linearization holds.
+const WIDEST_SCALE: f64 = 30.0;
+/// One wider than this many (300°, 3 m) says nothing: steps are as without it, and values stay where they start along gauges.
+const SAYS_NOTHING: f64 = 300.0;
+
 /// What became of a proposed step.
 enum Step {
     /// Taken, and the minimum is reached with it.
@@ -221,7 +229,18 @@ impl<'a> Descent<'a> {
         Self {
             objective,
             settings,
-            natural: natural(model),
+            natural: columns
+                .clone()
+                .map(|&p| {
+                    let typical = parameters[p].unit.typical_deviation();
+                    let scale = parameters[p].scale();
+                    if scale > SAYS_NOTHING * typical {
+                        typical.powi(-2)
+                    } else {
+                        scale.min(WIDEST_SCALE * typical).powi(-2)
+                    }
+                })
+                .collect(),
             prior: columns
                 .clone()
                 .map(|&p| {
@@ -279,6 +298,12 @@ impl<'a> Descent<'a> {
                 Step::None => break SolveStatus::Stalled,
             }
             if self.iterations > self.settings.max_iterations {
+                let last = self.taken.split_last();
+                let creeps = last
+                    .is_some_and(|(now, before)| creeps_for_little(*now, before, UNSEEN_AT_LAST));
+                if creeps {
+                    break SolveStatus::Converged;
+                }
                 break SolveStatus::MaxIterations;
             }
         };
@@ -384,26 +409,6 @@ impl<'a> Descent<'a> {
         sum
     }
 
-    /// Whether steps that shrink slowly lead nowhere that matters: the decrement falls by `rate` from each to the next of the same damping, and
-    /// the steps between them by as much. The sum of all that follow is δ/(1 − √rate) with δ over one such period; what they gain is half the
-    /// decrement over the same.
-    fn creeps_for_little(&self) -> bool {
-        let now = self.as_taken();
-        let recent = self.taken.iter().rev().take(PERIOD);
-        let alike = |t: &Taken| (t.damping / now.damping).ln().abs() < 0.1;
-        let Some(period) = recent.clone().position(alike) else {
-            return false;
-        };
-        let before = self.taken[self.taken.len() - 1 - period];
-        let rate = (now.decrement / before.decrement).min(1.0);
-        let between = recent.take(period);
-        let (gain, moved) = between.fold((now.decrement, now.seen.sqrt()), |(gain, moved), t| {
-            (gain + t.decrement, moved + t.seen.max(0.0).sqrt())
-        });
-        let shrinks = 1.0 - rate.sqrt();
-        rate > CREEPING && gain <= LITTLE * 2.0 * shrinks && moved <= UNSEEN_IN_ALL.sqrt() * shrinks
-    }
-
     /// The proposed step, as it is remembered once it is accepted.
     fn as_taken(&self) -> Taken {
         Taken {
@@ -445,7 +450,7 @@ impl<'a> Descent<'a> {
             let little = self.system.prior <= NOTHING && self.decrement <= SLIDE;
             little && rate > SLOW && self.seen_by_data() <= UNSEEN
         };
-        let creeps = || self.creeps_for_little();
+        let creeps = || creeps_for_little(self.as_taken(), &self.taken, UNSEEN_IN_ALL);
         let soon = self.constant_noise && expected <= enough;
         if self.decrement <= enough || soon || contracts || slides() || creeps() {
             let fallen = self.decrement <= enough || cost(objective, &self.trial, work) <= limit;
@@ -462,6 +467,25 @@ impl<'a> Descent<'a> {
             None
         }
     }
+}
+
+/// Whether steps that shrink slowly lead nowhere that matters: the decrement falls by `rate` from each to the next of the same damping, and
+/// the steps between them by as much. The sum of all that follow is δ/(1 − √rate) with δ over one such period; what they gain is half the
+/// decrement over the same. `unseen`: how far predictions may move in all, squared, in σ².
+fn creeps_for_little(now: Taken, taken: &[Taken], unseen: f64) -> bool {
+    let recent = taken.iter().rev().take(PERIOD);
+    let alike = |t: &Taken| (t.damping / now.damping).ln().abs() < 0.1;
+    let Some(period) = recent.clone().position(alike) else {
+        return false;
+    };
+    let before = taken[taken.len() - 1 - period];
+    let rate = (now.decrement / before.decrement).min(1.0);
+    let between = recent.take(period);
+    let (gain, moved) = between.fold((now.decrement, now.seen.sqrt()), |(gain, moved), t| {
+        (gain + t.decrement, moved + t.seen.max(0.0).sqrt())
+    });
+    let shrinks = 1.0 - rate.sqrt();
+    rate > CREEPING && gain <= LITTLE * 2.0 * shrinks && moved <= unseen.sqrt() * shrinks
 }
 
 #[cfg(test)]

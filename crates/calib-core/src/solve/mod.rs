@@ -10,7 +10,6 @@ pub(crate) mod dense;
 pub(crate) mod equations;
 pub(crate) mod kept_rows;
 pub(crate) mod minimize;
-pub(crate) mod natural;
 pub(crate) mod noise;
 pub(crate) mod normal;
 pub(crate) mod panel;
