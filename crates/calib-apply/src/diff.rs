@@ -43,16 +43,21 @@ pub fn diff_unified(a: &Path, b: &Path) -> Result<String, ApplyError> {
 
 /// The origins of a file; a YAML must have some, or all joints would seem to be removed.
 fn compared(path: &Path) -> Result<Origins, ApplyError> {
-    let found = origins(path)?;
-    if found.kind != Kind::Yaml {
-        return Ok(found);
+    let none = |is_profile| ApplyError::NoOrigins {
+        path: path.to_path_buf(),
+        is_profile,
+    };
+    let said = text(path)?;
+    let is_xml = said
+        .trim_start_matches('\u{feff}')
+        .trim_start()
+        .starts_with('<');
+    if !is_xml && said.lines().any(|line| line.starts_with("calib:")) {
+        return Err(none(true));
     }
-    let is_profile = text(path)?.lines().any(|line| line.starts_with("calib:"));
-    if is_profile || found.found.is_empty() {
-        return Err(ApplyError::NoOrigins {
-            path: path.to_path_buf(),
-            is_profile,
-        });
+    let found = origins(path)?;
+    if found.kind == Kind::Yaml && found.found.is_empty() {
+        return Err(none(false));
     }
     Ok(found)
 }
