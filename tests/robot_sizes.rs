@@ -13,8 +13,11 @@ use rand_distr::{Distribution, StandardNormal};
 use scratch::Scratch;
 use serde_json::Value;
 
-/// Name, kind, origin (in reaches), axis and range (rad, or reaches) of each joint: an arm in a plane with a quill.
-const JOINTS: [(&str, &str, [f64; 3], &str, [f64; 2]); 4] = [
+/// Name, kind, origin (in reaches), axis and range (rad, or reaches).
+type Joint = (&'static str, &'static str, [f64; 3], &'static str, [f64; 2]);
+
+/// An arm in a plane with a quill.
+const JOINTS: [Joint; 4] = [
     ("j1", "revolute", [0.0, 0.0, 0.3], "0 0 1", [-2.0, 2.0]),
     ("j2", "revolute", [0.4, 0.0, 0.0], "0 0 1", [-2.2, 2.2]),
     ("quill", "prismatic", [0.3, 0.0, 0.0], "0 0 -1", [0.0, 0.18]),
@@ -153,7 +156,7 @@ impl Session {
     }
 }
 
-fn unit(joint: &(&str, &str, [f64; 3], &str, [f64; 2])) -> String {
+fn unit(joint: &Joint) -> String {
     let unit = if joint.1 == "prismatic" { "m" } else { "rad" };
     format!("{}_{unit}", joint.0)
 }
