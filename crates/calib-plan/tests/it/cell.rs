@@ -157,7 +157,7 @@ fn files_of_shapes_that_are_missing_are_named_and_said_beside_the_trajectory() {
     let said = screen(&plan);
     for part in [
         "`plan.ground_mm` is not compared with links without shapes: `par_l`",
-        "`j2_l` (meshes/upper.stl)",
+        "could not be read: `j2_l`",
         "`robot.packages`",
         "trajectory.json are not checked for collisions of",
         "links without shapes (`par_l`)",
