@@ -10,7 +10,7 @@ use crate::TableRequest;
 use crate::answer::{Answer, answer, contradicted, coordinates, doubt, freedom, matrix};
 use crate::comparison::{Found, Quantity};
 use crate::error::FitError;
-use crate::explained::{Unexplained, unexplained};
+use crate::explained::{Judged, Unexplained, unexplained};
 use crate::road::{self, Command, Data, Road, Wish};
 use crate::table::Table;
 
@@ -84,21 +84,16 @@ fn against(request: &TableRequest, table: &Table, e: &AorEstimate) -> Option<Une
 }
 
 fn aor_answer(request: &TableRequest, table: &Table, id: &str, e: &AorEstimate) -> Answer {
-    let against = against(request, table, e);
-    let observable = e.verdict == Verdict::Ok && against.is_none();
-    let verdict = if against.is_some() {
-        Verdict::Weak
-    } else {
-        e.verdict
-    };
-    let unexplained = against.map(|a| a.reason(WHAT));
+    let own = (e.verdict, e.reason.as_deref());
+    let judged = Judged::new(own, against(request, table, e), WHAT);
+    let observable = judged.is_observable();
     let rejected = rejected(table, e);
     let frame = axis_frame(request);
     let value = json!({
         "estimator": id,
         "observable": observable,
-        "verdict": verdict.as_str(),
-        "reason": unexplained.as_ref().or(e.reason.as_ref()),
+        "verdict": judged.verdict.as_str(),
+        "reason": judged.reason,
         "frame": frame,
         "point_m": e.line.point.coords.as_slice(),
         "direction": e.line.direction.as_slice(),
@@ -111,7 +106,7 @@ fn aor_answer(request: &TableRequest, table: &Table, id: &str, e: &AorEstimate) 
     });
     let mut text = format!(
         "{id}:{} direction {} in the frame of {frame}\n",
-        against.map_or_else(String::new, |a| format!(" {}", a.head(WHAT))),
+        judged.head,
         coordinates(e.line.direction.as_slice())
     );
     text += &doubt(e.reason.as_deref());

@@ -10,7 +10,7 @@ use crate::TableRequest;
 use crate::answer::{Answer, answer, contradicted, coordinates, doubt, freedom, matrix};
 use crate::comparison::{Found, Quantity};
 use crate::error::FitError;
-use crate::explained::{Unexplained, unexplained};
+use crate::explained::{Judged, Unexplained, unexplained};
 use crate::road::{self, Command, Data, Road, Wish};
 use crate::table::Table;
 
@@ -96,25 +96,20 @@ fn against(request: &TableRequest, table: &Table, e: &CorEstimate) -> Option<Une
 }
 
 fn cor_answer(request: &TableRequest, table: &Table, id: &str, e: &CorEstimate) -> Answer {
-    let against = against(request, table, e);
-    let observable = e.verdict == Verdict::Ok && against.is_none();
-    let verdict = if against.is_some() {
-        Verdict::Weak
-    } else {
-        e.verdict
-    };
-    let unexplained = against.map(|a| a.reason(WHAT));
+    let own = (e.verdict, e.reason.as_deref());
+    let judged = Judged::new(own, against(request, table, e), WHAT);
+    let observable = judged.is_observable();
     let rejected = rejected(table, e);
     let mut value = json!({
         "estimator": id,
         "observable": observable,
-        "verdict": verdict.as_str(),
-        "reason": unexplained.as_ref().or(e.reason.as_ref()),
+        "verdict": judged.verdict.as_str(),
+        "reason": judged.reason,
         "center_m": e.center.coords.as_slice(),
     });
     let mut text = format!(
         "{id}:{} center {} m\n",
-        against.map_or_else(String::new, |a| format!(" {}", a.head(WHAT))),
+        judged.head,
         coordinates(e.center.coords.as_slice())
     );
     text += &doubt(e.reason.as_deref());

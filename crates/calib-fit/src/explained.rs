@@ -17,6 +17,7 @@
 use nalgebra::{Matrix3, Point3, Vector3};
 
 use calib_cor::Pose;
+use calib_estimator::Verdict;
 
 use crate::TableRequest;
 use crate::table::Table;
@@ -86,6 +87,37 @@ impl Unexplained {
             ),
             Some(_) => recording.to_owned(),
         }
+    }
+}
+
+/// An estimate as it is judged, with what the data as a whole say against it.
+pub(crate) struct Judged {
+    pub verdict: Verdict,
+    /// Why it is not good.
+    pub reason: Option<String>,
+    /// What stands before the estimate in the answer's first line, with a space; empty where nothing does.
+    pub head: String,
+}
+
+impl Judged {
+    /// `what`: axis or center.
+    pub fn new(own: (Verdict, Option<&str>), against: Option<Unexplained>, what: &str) -> Self {
+        match against {
+            Some(against) => Self {
+                verdict: Verdict::Weak,
+                reason: Some(against.reason(what)),
+                head: format!(" {}", against.head(what)),
+            },
+            None => Self {
+                verdict: own.0,
+                reason: own.1.map(str::to_owned),
+                head: String::new(),
+            },
+        }
+    }
+
+    pub fn is_observable(&self) -> bool {
+        self.verdict == Verdict::Ok
     }
 }
 

@@ -1,4 +1,4 @@
-//! What is little for a joint that slides: its strokes are as large as the robot, those of a joint that turns are not.
+//! Thresholds of joints that slide: their strokes scale with the robot, angles do not.
 
 use calib_urdf::JointId;
 

@@ -243,3 +243,28 @@ fn robustly(
     let r = |sum: f64, freedom: usize| (sum / freedom as f64).sqrt();
     Some((r(left, freedom), r(none, 3 * count), kept))
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::UnitQuaternion;
+
+    use super::*;
+
+    #[test]
+    fn a_body_moves_as_one_and_exchanged_labels_do_not() {
+        let [a, b, c] = [[0.0, 0.0, 0.0], [0.07, 0.0, 0.0], [0.02, 0.06, 0.0]].map(Point3::from);
+        let moved = Isometry3::new(
+            Vector3::new(0.02, -0.01, 0.0),
+            UnitQuaternion::from_euler_angles(0.1, 0.0, 0.8).scaled_axis(),
+        );
+        let noise = Vector3::new(3e-4, -3e-4, 2e-4);
+        let before = [a, b, c];
+        let after = [moved * a + noise, moved * b, moved * c - noise];
+        assert!(is_rigid(&before, &after, 2e-4));
+        assert!(is_rigid(&before[..1], &[b], 2e-4), "one marker");
+        // Labels that are exchanged in half of the fitted rows put both markers into the middle.
+        let middle = nalgebra::center(&a, &b);
+        assert!(!is_rigid(&[middle, middle], &[a, b], 2e-4));
+        assert!(!is_rigid(&[middle, middle, c], &before, 2e-4));
+    }
+}

@@ -164,7 +164,7 @@ fn of_reason(report: &Report, id: &str, again: &str) -> Option<[String; 2]> {
         }
         ReasonId::HeldOutBeyondStated => {
             format!(
-                "Look at the poses with the largest errors in the report; if they are right, let `{again} --select` try the effects that the model lacks."
+                "Look at the poses with the largest errors in the report. If nothing changed between the fitted recordings and the validation (the payload, the zero of a joint, a body), let `{again} --select` try the effects that the model lacks."
             )
         }
         ReasonId::ImplausibleChange => {

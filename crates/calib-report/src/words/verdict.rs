@@ -330,7 +330,7 @@ fn of_prediction(reason: &Reason, v: &Values<'_>) -> String {
         ReasonId::HeldOutBeyondStated => {
             let [value, high] = ["value", "high"].map(|key| v.number(key));
             let because = match v.name("cause") {
-                "" => "the stated uncertainty is too small".to_owned(),
+                "" => "something changed before the validation, the model lacks an effect, or the stated uncertainty is too small".to_owned(),
                 cause => format!(
                     "because of what `{cause}` names, or because the stated uncertainty is too small"
                 ),

@@ -1,4 +1,4 @@
-//! Bodies of two markers: one distance, which no other one tells from noise but its own rows do.
+//! Bodies of two markers: with one distance, only its own rows show whether it changes.
 
 use calib_finding::{Fact, Finding, Severity, Subject, catalog};
 use calib_recording::Poses;
@@ -18,8 +18,8 @@ const SLID: f64 = 4.0;
 /// Refraction and calibration do not change a distance by more from place to place, m.
 const DISTORTION: f64 = 1e-3;
 
-/// That the distance of two markers is another one in many rows, or changes slowly. The noise is what most rows have, or what they have from one
-/// row to the next, whichever is less.
+/// That the distance of two markers is another one in many rows, or changes slowly. Its noise is the scatter about the median, or that from row to
+/// row, whichever is less.
 pub(super) fn changes(name: &str, markers: &[String], poses: &Poses) -> Option<Finding> {
     let [first, second] = markers else {
         return None;

@@ -81,3 +81,37 @@ fn equal_scales_and_a_marker_that_moved_are_no_scale() {
         assert!(moved.is_empty(), "{seed}: {moved:?}");
     }
 }
+
+#[test]
+fn a_body_that_a_filter_makes_smaller_and_a_marker_that_slid_are_no_scale() {
+    let at = [
+        Vector3::new(0.0, 0.0, 0.0),
+        Vector3::new(0.08, 0.0, 0.0),
+        Vector3::new(0.02, 0.06, 0.0),
+    ];
+    let names: Vec<String> = (0..3).map(|k| format!("m{k}")).collect();
+    let expected = Expectations {
+        bodies: BTreeMap::from([("hand".to_owned(), names)]),
+        ..Expectations::default()
+    };
+    for seed in 0..200 {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let usual = recording(&at, 40, 1.0, &mut rng);
+        let [a, mut b, c] = at;
+        b.x += 7e-4;
+        let slid = recording(&[a, b, c], 40, 1.0, &mut rng);
+        let found = other_scales(&[("usual", &usual), ("slid", &slid)], &expected);
+        assert!(found.is_empty(), "{seed}: {found:?}");
+        // Four fifths of a row and one of the row before it.
+        let mut filtered = recording(&at, 40, 1.0, &mut rng);
+        for track in filtered.markers.values_mut() {
+            let before = track.clone();
+            for row in 1..track.len() {
+                let (now, last) = (before[row].expect("seen"), before[row - 1].expect("seen"));
+                track[row] = Some(nalgebra::Point3::from(0.8 * now.coords + 0.2 * last.coords));
+            }
+        }
+        let found = other_scales(&[("usual", &usual), ("filtered", &filtered)], &expected);
+        assert!(found.is_empty(), "{seed}: {found:?}");
+    }
+}
