@@ -23,6 +23,7 @@ mod fleet_faults;
 mod gantry;
 mod held_readings;
 mod holds_and_rows;
+mod homed;
 mod hostile;
 mod hygiene;
 mod init;

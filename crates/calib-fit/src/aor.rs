@@ -3,7 +3,7 @@
 use std::fmt::Write as _;
 
 use calib_aor::AorEstimate;
-use calib_estimator::{Kind, Verdict};
+use calib_estimator::Kind;
 use serde_json::json;
 
 use crate::TableRequest;

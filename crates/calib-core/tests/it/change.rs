@@ -20,6 +20,8 @@ enum Event {
     Bump(f64),
     /// A joint's zero moves, rad.
     Encoder(usize, f64),
+    /// The zeros of all joints move, rad: each by ± this, up to twice.
+    Homed(f64),
     /// The tracker moves evenly, m from first to last.
     Drift(f64),
     /// The tracker moves as what warms up, m in the end: with this time constant, in parts of all samples.
@@ -119,6 +121,7 @@ fn case_with(seed: u64, design: Design, event: Event, fitted: Fitted) -> Case {
             Event::Slip(m) if later => chain.true_mount = before * shift(m),
             Event::Bump(m) if later => chain.true_world = shift(m) * after,
             Event::Encoder(j, q) if later => extra[j] += q,
+            Event::Homed(q) if later => extra.iter_mut().zip(HOMED).for_each(|(e, h)| *e += q * h),
             Event::Drift(m) => chain.true_world = shift(m * s as f64 / samples as f64) * after,
             Event::Warming(m, part) => {
                 let t = s as f64 / samples as f64;
@@ -187,6 +190,9 @@ fn found(
     }
     (any, first, row, named)
 }
+
+/// Where the zeros of a homed robot went, in parts of the size.
+const HOMED: [f64; 6] = [1.0, -1.4, 0.8, 2.0, -1.0, 1.2];
 
 /// Two standard deviations of a marker: what must be found at 40 poses.
 const TWO: f64 = 2.0 * SIGMA;
@@ -364,6 +370,38 @@ fn a_step_that_turns_far_has_its_size() {
         }
     }
     assert!(far.len() <= 1, "of {cases}: {far:?}");
+}
+
+/// A robot that was homed: all zeros are others, and neither the tracker nor a body moved.
+#[test]
+fn a_robot_that_was_homed_is_no_tracker_that_moved() {
+    let (mut wrong, mut far, mut cases) = (Vec::new(), Vec::new(), 0);
+    for design in [Design::Random(40), Design::Sweeps(8)] {
+        // 0.1° and 1°
+        for size in [1.7e-3, 1.7e-2] {
+            for seed in 0..8 {
+                let case = case(seed, design, Event::Homed(size));
+                let scan = scan(&case);
+                cases += 1;
+                let mut named = scan.significant().into_iter().chain(scan.rivals());
+                let Some(change) = named.find(|c| c.moved == Moved::Zeros) else {
+                    let first = scan.significant().map(|c| (c.moved, c.excess));
+                    let zeros = scan.changes.iter().find(|c| c.moved == Moved::Zeros);
+                    let zeros = zeros.map(|c| c.excess);
+                    wrong.push((design, size, seed, first, zeros));
+                    continue;
+                };
+                assert_eq!(change.joints, case.h.joints);
+                let steps = change.jump.iter().zip(&change.sigma).zip(HOMED);
+                far.extend(steps.filter_map(|((step, sigma), times)| {
+                    let off = (step - size * times) / sigma;
+                    (off.abs() > 3.5).then_some((design, size, seed, off))
+                }));
+            }
+        }
+    }
+    assert!(wrong.len() <= 2, "of {cases}: {wrong:?}");
+    assert!(far.len() <= 4, "of {} steps: {far:?}", 6 * cases);
 }
 
 /// Gross outliers that follow each other are no change: nothing that moved once explains them.

@@ -93,9 +93,12 @@ super::topic! {
     }
     /// A joint's zero is another one in held-out recordings.
     JOINT_ZERO_CHANGED = "joint-zero-changed" {
-        "": Error,
+        "one": Error,
             "The errors in {recordings:code} are {none} per coordinate, but only {best} if the zero of joint `{joint}` changed by {step} ± {sigma} before.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
             "Check the encoder of joint `{joint}`, its coupling, how it is homed and, where a recording states its value, this value. If its zero changed, record the fitted recordings again as well: they are of the robot as it was.";
+        "several": Error,
+            "The errors in {recordings:code} are {none} per coordinate, but only {best} if the zeros of joints {joints:code} changed before, most clearly that of `{joint}`: by {step} ± {sigma}.",
+            "If the robot was homed or its controller restarted in between, its zeros are those of one homing: record everything after one homing. Otherwise check the encoders and couplings of these joints.";
     }
     /// Tracker and joints were read at different times.
     CLOCK_LAG = "clock-lag" {

@@ -147,7 +147,7 @@ fn split_at(inputs: &Inputs, fit: &MlFit, change: &Change) -> Option<(String, Sp
 fn shorter_side(inputs: &Inputs, fit: &MlFit, change: &Change) -> Vec<Excluded> {
     if !matches!(
         change.moved,
-        Moved::Body(_) | Moved::Reference(_) | Moved::Joint(_)
+        Moved::Body(_) | Moved::Reference(_) | Moved::Joint(_) | Moved::Zeros
     ) {
         return Vec::new();
     }

@@ -109,12 +109,12 @@ fn of_change<'a>(
     let kind = match change.moved {
         Moved::Body(_) => UntestedKind::Slip,
         Moved::Reference(_) => UntestedKind::Bump,
-        Moved::Joint(_) => UntestedKind::Step,
+        Moved::Joint(_) | Moved::Zeros => UntestedKind::Step,
         Moved::Drift(_) | Moved::Settling(_) => UntestedKind::Drift,
         // What is predicted is seen by the same tracker.
         _ => return None,
     };
-    let name = name_of(inputs, fit, change.moved)?;
+    let name = name_of(inputs, fit, change)?;
     let carries = matches!(change.moved, Moved::Body(body) if frame_of(fit, target) == Some(body));
     Some((untested(kind, &name), OpenCause::Found { change, carries }))
 }

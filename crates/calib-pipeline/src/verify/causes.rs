@@ -1,9 +1,7 @@
 //! What made the residuals: missing effects, a change while recording, or what was suspected before the fit. Each is stated only
 //! where it explains something beside the others.
 
-use calib_core::{
-    ChanceOfChanges, Change, ChangeScan, Contest, GoodnessOfFit, Moved, ScoreTest, Suspect,
-};
+use calib_core::{ChanceOfChanges, Change, ChangeScan, Contest, GoodnessOfFit, ScoreTest, Suspect};
 use calib_finding::{Fact, Finding, catalog};
 
 use super::elimination::{Asked, Held, eliminated};
@@ -214,10 +212,8 @@ fn asked(
 
 /// By how much a step of a joint turns what lies behind it, rad: a row that it moves by d is linearized to within d times this.
 fn turned(change: &Change) -> f64 {
-    match change.moved {
-        Moved::Joint(_) => change.jump[0],
-        _ => 0.0,
-    }
+    let steps = change.jump.iter().take(change.joints.len());
+    steps.map(|step| step.abs()).fold(0.0, f64::max)
 }
 
 /// What is set beside each other.

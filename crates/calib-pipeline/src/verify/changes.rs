@@ -16,6 +16,9 @@ use crate::prepare::inputs::Inputs;
 /// Standard deviations within which the size of a change lies, 97.5 % on the side that counts.
 const CERTAIN: f64 = 2.0;
 
+/// Standard deviations from which the zero of one of several joints counts as changed.
+const CLEAR: f64 = 3.0;
+
 /// An angle below it is rounding, rad.
 const ROUNDING: f64 = 1e-9;
 
@@ -79,8 +82,13 @@ pub fn finding(inputs: &Inputs, fit: &MlFit, scan: &ChangeScan, beside: Beside) 
     };
     let rivals = scan.rivals().into_iter();
     let others = rivals.filter(|c| !(is_tracker(c.moved) && is_tracker(change.moved)));
-    let mut rivals: Vec<String> = others.filter_map(|c| names.of(c.moved)).collect();
+    let (zeros, others): (Vec<_>, Vec<_>) = others.partition(|c| c.moved == Moved::Zeros);
+    let mut rivals: Vec<String> = others.into_iter().filter_map(|c| names.of(c)).collect();
     rivals.dedup();
+    let zeros = zeros
+        .into_iter()
+        .flat_map(|c| names.clear_steps(c))
+        .collect();
     // What of the size is beyond doubt.
     let of = |name| finding.facts.get(name).and_then(Fact::value);
     let size = of("distance").map(|size| size - CERTAIN * of("sigma").unwrap_or(0.0));
@@ -94,6 +102,7 @@ pub fn finding(inputs: &Inputs, fit: &MlFit, scan: &ChangeScan, beside: Beside) 
     let names = |all: Vec<String>| (!all.is_empty()).then(|| Fact::names(all));
     let finding = finding
         .with_some("rivals", names(rivals))
+        .with_some("zeros", names(zeros))
         .with_some("alternatives", names(beside.alike))
         .with_some("physics", beside.physics.map(Fact::name));
     Some(if harmful && certain {
@@ -115,7 +124,7 @@ pub fn rows_of(
     const NEARLY_ALL: f64 = 0.7;
     if !matches!(
         change.moved,
-        Moved::Body(_) | Moved::Reference(_) | Moved::Joint(_)
+        Moved::Body(_) | Moved::Reference(_) | Moved::Joint(_) | Moved::Zeros
     ) {
         return Vec::new();
     }
@@ -191,8 +200,8 @@ pub fn scatter(inputs: &Inputs, fit: &MlFit, scatter: Scatter) -> Option<Finding
 
 /// What moved, as the profile and the URDF call it.
 #[must_use]
-pub fn name_of(inputs: &Inputs, fit: &MlFit, moved: Moved) -> Option<String> {
-    Names { inputs, fit }.of(moved)
+pub fn name_of(inputs: &Inputs, fit: &MlFit, change: &Change) -> Option<String> {
+    Names { inputs, fit }.of(change)
 }
 
 /// What the parts of the problem are called.
@@ -212,16 +221,43 @@ impl Names<'_> {
         self.inputs.robot.model.joints().get(place)
     }
 
-    /// What a rival explanation is called.
-    fn of(&self, moved: Moved) -> Option<String> {
-        match moved {
+    /// What a rival explanation is called; of several joints the one whose step is clearest.
+    fn of(&self, change: &Change) -> Option<String> {
+        match change.moved {
             Moved::Body(frame) => self.body(frame).cloned(),
-            Moved::Joint(edge) => self.joint(edge).map(|joint| joint.name.clone()),
+            Moved::Joint(_) | Moved::Zeros => {
+                let steps = self.steps(change);
+                steps.first().map(|step| step.joint.name.clone())
+            }
             Moved::Reference(_) | Moved::Drift(_) | Moved::Settling(_) => {
                 Some(self.inputs.robot.profile.tracker.frame.clone())
             }
             _ => None,
         }
+    }
+
+    /// The steps of joints, the clearest first.
+    fn steps(&self, change: &Change) -> Vec<Step<'_>> {
+        let sizes = change.jump.iter().zip(&change.sigma);
+        let joints = change.joints.iter().zip(sizes);
+        let mut steps: Vec<Step<'_>> = joints
+            .filter_map(|(edge, (size, sigma))| {
+                Some(Step {
+                    joint: self.joint(*edge)?,
+                    size: *size,
+                    sigma: *sigma,
+                })
+            })
+            .collect();
+        steps.sort_by(|a, b| b.clearness().total_cmp(&a.clearness()));
+        steps
+    }
+
+    /// The joints whose steps are clear.
+    fn clear_steps(&self, change: &Change) -> Vec<String> {
+        let steps = self.steps(change).into_iter();
+        let clear = steps.filter(Step::is_clear);
+        clear.map(|step| step.joint.name.clone()).collect()
     }
 
     fn described(&self, change: &Change) -> Option<Finding> {
@@ -238,29 +274,28 @@ impl Names<'_> {
             Moved::Scale(_) => Finding::of_kind(id, "scale", About::Tracker)
                 .with("scale", Fact::ratio(change.jump[0]))
                 .with("sigma_scale", Fact::ratio(change.sigma[0])),
-            Moved::Joint(edge) => {
-                let joint = self.joint(edge)?;
-                let (kind, size, sigma) = if joint.kind.turns() {
-                    (
-                        "joint",
-                        ("angle", Fact::radians(change.jump[0].abs())),
-                        ("sigma_angle", Fact::radians(change.sigma[0])),
-                    )
-                } else {
-                    (
-                        "axis",
-                        ("distance", Fact::meters(change.jump[0].abs())),
-                        ("sigma", Fact::meters(change.sigma[0])),
-                    )
+            Moved::Joint(_) => {
+                let steps = self.steps(change);
+                let own = steps.first()?;
+                let kind = match own.joint.kind.turns() {
+                    true => "joint",
+                    false => "axis",
                 };
-                Finding::of_kind(id, kind, Subject::joint(joint.name.clone()))
-                    .with(size.0, size.1)
-                    .with(sigma.0, sigma.1)
+                own.told(Finding::of_kind(id, kind, own.subject()))
+            }
+            Moved::Zeros => {
+                let steps = self.steps(change);
+                let most = steps.first()?;
+                let finding = Finding::of_kind(id, "zeros", most.subject())
+                    .with("joint", Fact::name(&most.joint.name))
+                    .with("joints", Fact::names(self.clear_steps(change)));
+                most.told(finding)
             }
             _ => return None,
         };
-        let finding = match change.jump.len() {
-            6 => {
+        let finding = match change.moved {
+            Moved::Joint(_) | Moved::Zeros => finding,
+            _ if change.jump.len() == 6 => {
                 let (angle, _) = size(&change.jump[..3], &change.sigma[..3]);
                 let (distance, sigma) = size(&change.jump[3..], &change.sigma[3..]);
                 // A lone marker shows no rotation.
@@ -324,6 +359,39 @@ impl Names<'_> {
             )
             .in_recording(recording.clone())
             .at_rows([after])
+    }
+}
+
+/// How far the zero of a joint went, rad or m.
+struct Step<'a> {
+    joint: &'a Joint,
+    size: f64,
+    sigma: f64,
+}
+
+impl Step<'_> {
+    fn clearness(&self) -> f64 {
+        self.size.abs() / self.sigma.max(f64::MIN_POSITIVE)
+    }
+
+    fn is_clear(&self) -> bool {
+        self.clearness() > CLEAR
+    }
+
+    fn subject(&self) -> Subject {
+        Subject::joint(self.joint.name.clone())
+    }
+
+    fn told(&self, finding: Finding) -> Finding {
+        let size = self.size.abs();
+        match self.joint.kind.turns() {
+            true => finding
+                .with("angle", Fact::radians(size))
+                .with("sigma_angle", Fact::radians(self.sigma)),
+            false => finding
+                .with("distance", Fact::meters(size))
+                .with("sigma", Fact::meters(self.sigma)),
+        }
     }
 }
 

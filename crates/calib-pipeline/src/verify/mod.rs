@@ -24,6 +24,7 @@ mod seen;
 mod suspects;
 pub(crate) mod tracker_noise;
 mod tried;
+mod zeros;
 
 use std::collections::BTreeMap;
 

@@ -3,6 +3,8 @@
 //! Held-out errors of a robot that is right are small; of one that is wrong they differ from posture to posture. Errors that one motion
 //! explains are neither: something moved. It is named where r(none) / r(best) ≥ 3, with r as in `tried.rs`.
 //!
+//! Several zeros may have changed at once, as where the robot was homed: they are named where nothing simpler explains nearly as much.
+//!
 //! One number of a joint can also be what the fit does not know: a zero counts as changed where the errors are beyond what the fit states of
 //! their prediction, once in a thousand validations.
 
@@ -20,7 +22,8 @@ use crate::prepare::conditions::conditions;
 use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::tracks::BodyTrack;
 use crate::verify::seen::{Seen, View};
-use crate::verify::tried::{Motion, Tried, remounted, rows, tracker, zero_changed};
+use crate::verify::tried::{Motion, Tried, ZeroStep, remounted, rows, tracker};
+use crate::verify::zeros::zeros_changed;
 
 /// r(none) / r(best) from which a motion is named: over ten times the variance.
 const NAMED: f64 = 3.0;
@@ -28,6 +31,8 @@ const NAMED: f64 = 3.0;
 const ALIKE: f64 = 1.5;
 /// A motion that leaves fewer than this part of the points explains nothing: the others would be gross outliers beside it.
 const KEPT: f64 = 0.75;
+/// Standard deviations from which the zero of one of several joints counts as changed.
+const CLEAR: f64 = 3.0;
 /// Fewer postures than this are explained by any motion.
 const POSTURES: usize = 5;
 
@@ -76,7 +81,7 @@ fn finding(inputs: &Inputs, best: &Tried, rivals: &[Tried], recordings: &[&str])
     let code = |motion: &Motion| match motion {
         Motion::Tracker => Some("moved(tracker)".to_owned()),
         Motion::Body(name) => Some(format!("remounted({name})")),
-        Motion::Joint(_) => None,
+        Motion::Joint(_) | Motion::Zeros => None,
     };
     let joint = |tried: &Tried| match tried.motion {
         Motion::Joint(joint) => Some(model.joint(joint).name.clone()),
@@ -94,19 +99,31 @@ fn finding(inputs: &Inputs, best: &Tried, rivals: &[Tried], recordings: &[&str])
                 .with("distance", distance)
                 .with("sigma", sigma)
         }
-        Motion::Joint(joint) => {
-            let joint = model.joint(*joint);
+        Motion::Joint(_) | Motion::Zeros => {
+            let joint = model.joint(best.steps[0].joint);
+            let kind = match best.motion {
+                Motion::Zeros => "several",
+                _ => "one",
+            };
             let of_joint = |value| match joint.kind.turns() {
                 true => Fact::radians(value),
                 false => Fact::meters(value),
             };
-            Finding::new(catalog::JOINT_ZERO_CHANGED, Subject::joint(&joint.name))
+            let subject = Subject::joint(&joint.name);
+            Finding::of_kind(catalog::JOINT_ZERO_CHANGED, kind, subject)
                 .with("joint", Fact::name(&joint.name))
                 .with("step", of_joint(best.shift))
                 .with("sigma", of_joint(best.sigma))
         }
     };
     let names = |all: Vec<String>| (!all.is_empty()).then(|| Fact::names(all));
+    // Those that changed together, or each of which explains as much.
+    let joints: Vec<String> = match best.motion {
+        Motion::Zeros => clear(best)
+            .map(|step| model.joint(step.joint).name.clone())
+            .collect(),
+        _ => rivals.iter().filter_map(joint).collect(),
+    };
     let mut finding = finding
         .with("recordings", Fact::names(recordings.iter().copied()))
         .with("none", Fact::meters(best.none))
@@ -116,7 +133,7 @@ fn finding(inputs: &Inputs, best: &Tried, rivals: &[Tried], recordings: &[&str])
             "equivalent",
             names(rivals.iter().filter_map(|r| code(&r.motion)).collect()),
         )
-        .with_some("joints", names(rivals.iter().filter_map(joint).collect()));
+        .with_some("joints", names(joints));
     finding.subject.recordings = recordings.iter().map(|name| (*name).to_owned()).collect();
     let limit = inputs.robot.profile.solve.limits.held_out_rms;
     let harmless = limit.is_some_and(|limit| best.none * 3.0_f64.sqrt() < limit);
@@ -129,7 +146,7 @@ fn finding(inputs: &Inputs, best: &Tried, rivals: &[Tried], recordings: &[&str])
 
 /// The motion that explains the errors of a recording, and those that are as good.
 fn explained(view: &View<'_>, fit: Option<&MlFit>) -> Option<(Tried, Vec<Tried>)> {
-    let points = view.points(None);
+    let points = view.points(&[]);
     if rows(&points) < POSTURES {
         return None;
     }
@@ -149,13 +166,19 @@ fn explained(view: &View<'_>, fit: Option<&MlFit>) -> Option<(Tried, Vec<Tried>)
     if place.is_none() && !beyond(&BTreeSet::new()) {
         return None;
     }
-    let joints: Vec<JointId> = view.inputs.robot.model.independent_joints().collect();
-    let joints = joints.into_iter();
-    let joints: Vec<Tried> = joints
-        .filter_map(|joint| zero_changed(view, &points, joint))
+    let all: Vec<JointId> = view.inputs.robot.model.independent_joints().collect();
+    let joints: Vec<Tried> = all
+        .iter()
+        .filter_map(|joint| zeros_changed(view, &points, &[*joint]))
         .filter(explains)
         .collect();
     let least = |all: &[Tried]| all.iter().map(|t| t.left).fold(f64::INFINITY, f64::min);
+    let simplest = f64::min(least(&places), least(&joints));
+    let together = together(view, &points, &all)
+        .filter(|zeros| ALIKE * zeros.left < simplest && beyond(&gross(&points, zeros)));
+    if let Some(zeros) = together {
+        return Some((zeros, Vec::new()));
+    }
     // One number that explains more than six is the cause, and neither tracker nor body moved.
     let (mut own, mut others, found) = match place {
         Some(place) if ALIKE * least(&joints) >= places[place].left => (places, joints, place),
@@ -169,6 +192,21 @@ fn explained(view: &View<'_>, fit: Option<&MlFit>) -> Option<(Tried, Vec<Tried>)
     own.retain(|t| t.left < ALIKE * found.left);
     own.sort_by(|a, b| a.left.total_cmp(&b.left));
     Some((found, own))
+}
+
+/// Steps of the zeros that changed.
+fn clear(zeros: &Tried) -> impl Iterator<Item = &ZeroStep> {
+    zeros.steps.iter().filter(|step| step.clearness() > CLEAR)
+}
+
+/// The zeros of all joints together, where that can be named: more than one of them changed.
+fn together(view: &View<'_>, points: &[Seen<'_>], joints: &[JointId]) -> Option<Tried> {
+    if joints.len() < 2 || rows(points) <= joints.len() {
+        return None;
+    }
+    let zeros = zeros_changed(view, points, joints)?;
+    let named = zeros.none >= NAMED * zeros.left && explains(&zeros);
+    (named && clear(&zeros).count() > 1).then_some(zeros)
 }
 
 /// Whether a motion explains nearly what a named one does. Where it has nothing to do with a body whose errors are large, these are its

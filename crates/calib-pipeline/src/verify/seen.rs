@@ -35,12 +35,12 @@ pub(super) struct View<'a> {
 }
 
 impl<'a> View<'a> {
-    /// All points, in the order of the rows; with a joint moved by so much, rad or m.
-    pub(super) fn points(&self, moved: Option<(JointId, f64)>) -> Vec<Seen<'a>> {
+    /// All points, in the order of the rows; with joints moved by so much, rad or m.
+    pub(super) fn points(&self, moved: &[(JointId, f64)]) -> Vec<Seen<'a>> {
         let mut out = Vec::new();
         for (row, q) in self.loaded.q.iter().enumerate() {
             let Some(mut q) = q.clone() else { continue };
-            if let Some((joint, by)) = moved {
+            for (joint, by) in moved {
                 q[joint.index()] += by;
             }
             let root_from_link = self.robot.root_from_link_under(&q, &self.under[row]);

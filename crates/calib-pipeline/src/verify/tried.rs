@@ -4,7 +4,7 @@
 //! none      e = p_i − s_i                                            p predicted, s seen
 //! tracker   e = T p_i − s_i,   T ∈ SE(3) the same for all bodies      6 unknowns
 //! body      e = m_k − (tracker_from_link_i)⁻¹ s_ik                    one place m_k per point of the body on its link
-//! joint     e = p_i(q_j + c) − s_i                                    1 unknown
+//! joint     e = p_i(q_j + c_j) − s_i                                  1 unknown, or one for each of several joints (`zeros.rs`)
 //! r² = Σ|e|² / (3N − unknowns)                                                                            (1)
 //! ```
 
@@ -12,16 +12,10 @@ use calib_geometry::registration::rigid_registration;
 use calib_urdf::JointId;
 use nalgebra::{Isometry3, Point3, Vector3};
 
-use crate::verify::seen::{Seen, View};
+use crate::verify::seen::Seen;
 
 /// Errors beyond this many times the median under a hypothesis are gross outliers of the tracker.
 const GROSS: f64 = 5.0;
-/// Step of a joint in difference quotients, rad or m.
-const STEP: f64 = 1e-5;
-/// Linearizations of a joint's step.
-const ROUNDS: usize = 3;
-/// Part of the errors that the first linearization leaves, at most, where a second one is worth its time.
-const WORTH: f64 = 0.7;
 
 /// What may have moved.
 #[derive(Debug, Clone, PartialEq)]
@@ -29,6 +23,22 @@ pub(super) enum Motion {
     Tracker,
     Body(String),
     Joint(JointId),
+    /// The zeros of several joints.
+    Zeros,
+}
+
+/// How much further a joint stands than it is read, and its σ, rad or m.
+#[derive(Clone, Copy)]
+pub(super) struct ZeroStep {
+    pub(super) joint: JointId,
+    pub(super) by: f64,
+    pub(super) sigma: f64,
+}
+
+impl ZeroStep {
+    pub(super) fn clearness(&self) -> f64 {
+        self.by.abs() / self.sigma.max(f64::MIN_POSITIVE)
+    }
 }
 
 /// A motion that was tried.
@@ -37,9 +47,11 @@ pub(super) struct Tried {
     /// r of (1), m, and of the same points without a motion.
     pub(super) left: f64,
     pub(super) none: f64,
-    /// Where the middle of what was seen went, m, and its σ; of a joint by how much it stands further than it is read, rad or m.
+    /// Where the middle of what was seen went, m, and its σ; of joints the step of the clearest one, rad or m.
     pub(super) shift: f64,
     pub(super) sigma: f64,
+    /// Of joints, the clearest first.
+    pub(super) steps: Vec<ZeroStep>,
     /// Rotation, where it is determined, rad; none of a joint.
     pub(super) angle: Option<f64>,
     /// Which of the points were taken: the others are gross outliers.
@@ -70,6 +82,7 @@ pub(super) fn tracker(points: &[Seen<'_>]) -> Option<Tried> {
         none,
         shift: (t * middle - middle).norm(),
         sigma: sigma(points, left),
+        steps: Vec::new(),
         angle: Some(t.rotation.angle()),
         kept,
     })
@@ -130,6 +143,7 @@ pub(super) fn remounted(points: &[Seen<'_>], body: &str) -> Option<Tried> {
         none,
         shift: shift.norm(),
         sigma: sigma(points, left),
+        steps: Vec::new(),
         angle: turned.map(|t| t.b_from_a.rotation.angle()),
         kept,
     })
@@ -152,57 +166,6 @@ fn is_rigid(from: &[Point3<f64>], to: &[Point3<f64>], sigma: f64) -> bool {
     })
 }
 
-/// c of (1). What is left is that of the robot with the joint moved by c, not of its linearization.
-pub(super) fn zero_changed(view: &View<'_>, points: &[Seen<'_>], joint: JointId) -> Option<Tried> {
-    let mut step = 0.0;
-    let mut at = view.points(None);
-    let mut found = None;
-    for _ in 0..ROUNDS {
-        let beside = view.points(Some((joint, step + STEP)));
-        let slopes: Vec<Vector3<f64>> = at
-            .iter()
-            .zip(beside)
-            .map(|(a, b)| (b.predicted - a.predicted) / STEP)
-            .collect();
-        let (_, _, kept) = robustly(points, 1, |kept| {
-            let by = further(&at, &slopes, kept)?.0;
-            let error = |(p, d): (&Seen<'_>, &Vector3<f64>)| p.predicted - p.seen + d * by;
-            Some(at.iter().zip(&slopes).map(error).collect())
-        })?;
-        let (by, size) = further(&at, &slopes, &kept)?;
-        step += by;
-        at = view.points(Some((joint, step)));
-        let applied = |_: &[bool]| Some(at.iter().map(|p| p.predicted - p.seen).collect());
-        let (left, none, kept) = robustly(points, 1, applied)?;
-        found = Some((left, none, kept, size));
-        // What explains nothing at the first step explains nothing at the second.
-        if left > WORTH * none {
-            break;
-        }
-    }
-    let (left, none, kept, size) = found?;
-    // Points of one posture share its error.
-    let rows = rows(points).max(1) as f64;
-    Some(Tried {
-        motion: Motion::Joint(joint),
-        left,
-        none,
-        shift: step,
-        sigma: left * (points.len() as f64 / rows / size).sqrt(),
-        angle: None,
-        kept,
-    })
-}
-
-/// The step of a joint beyond where the points are predicted, rad or m, and Σ|∂p/∂q|²; `None` where it moves none of them.
-fn further(points: &[Seen<'_>], slopes: &[Vector3<f64>], kept: &[bool]) -> Option<(f64, f64)> {
-    let all = points.iter().zip(slopes).zip(kept);
-    let of_kept = || all.clone().filter(|(_, kept)| **kept).map(|(pair, _)| pair);
-    let size: f64 = of_kept().map(|(_, d)| d.norm_squared()).sum();
-    let along: f64 = of_kept().map(|(p, d)| d.dot(&(p.predicted - p.seen))).sum();
-    (size > 0.0).then(|| (-along / size, size))
-}
-
 /// σ of a mean over the postures, m: points of one posture share its error.
 fn sigma(points: &[Seen<'_>], left: f64) -> f64 {
     left * (3.0 / rows(points).max(1) as f64).sqrt()
@@ -216,7 +179,7 @@ pub(super) fn rows(points: &[Seen<'_>]) -> usize {
 }
 
 /// r of (1) with and without a motion, and the points that it was computed from: gross outliers under the motion are left out.
-fn robustly(
+pub(super) fn robustly(
     points: &[Seen<'_>],
     unknowns: usize,
     fit: impl Fn(&[bool]) -> Option<Vec<Vector3<f64>>>,

@@ -4,6 +4,8 @@
 //! z ~ N(0, I),   z_p ~ N(0, 0.16 I),   g = Aᵀz + Λ^½ z_p,   a = Rᵀ g,   U = Σ_{s∈S} B̃ᵀz − (Rᵀ E)ᵀ a,   F = |z|² + |z_p|² − |a|²     (1)
 //! ```
 
+use std::collections::BTreeSet;
+
 use calib_geometry::statistics::quantile_nearest;
 use nalgebra::DMatrix;
 use rand::SeedableRng;
@@ -13,7 +15,8 @@ use rayon::prelude::*;
 
 use super::columns::Pattern;
 use super::levels::{Drawn, Levels, Tests};
-use super::sums::Design;
+use super::sums::{Design, SIMULATED};
+use super::together::asked_more;
 use super::{ChangeSettings, Moved};
 
 /// What is drawn of a prior's σ: robots are nearer to their drawings than priors say, and F, which T counts from, is smaller for it. Drawn in
@@ -39,7 +42,7 @@ const TOGETHER: usize = 10;
 pub struct ChanceOfChanges {
     /// What was scanned.
     design: Scope,
-    /// By candidate: T that its best range exceeds in a tenth of the draws.
+    /// By candidate: T that its best range exceeds in a tenth of the draws, and what is [asked beyond](asked_more).
     pub(super) quantiles: Vec<f64>,
     /// Excess over the quantiles that all candidates together exceed with the stated chance.
     pub(super) threshold: f64,
@@ -58,7 +61,6 @@ impl ChanceOfChanges {
         const FIRST: usize = 20;
         /// So many of them above what is seen: a chance of 0.3 % would bring that about once in 600 scans, a smaller one less often.
         const ABOVE: usize = 2;
-        let count = levels.designs[0].columns.len();
         let shifts: Vec<Vec<DMatrix<f64>>> = levels.designs.iter().map(shifts).collect();
         let mut rng = ChaCha8Rng::seed_from_u64(settings.seed);
         let all = settings.draws.max(20);
@@ -79,7 +81,7 @@ impl ChanceOfChanges {
         };
         draw(&mut draws, FIRST.min(all));
         let explain = |seen: &[f64]| {
-            let quantiles = quantiles(&draws, count);
+            let quantiles = quantiles(&draws, &design);
             let of_data = excess(seen, &quantiles);
             let above = draws.iter().filter(|d| excess(d, &quantiles) > of_data);
             above.count() >= ABOVE
@@ -87,7 +89,7 @@ impl ChanceOfChanges {
         if !seen.is_some_and(explain) {
             draw(&mut draws, all);
         }
-        let quantiles = quantiles(&draws, count);
+        let quantiles = quantiles(&draws, &design);
         let largest = draws.iter().map(|d| excess(d, &quantiles));
         Self {
             design,
@@ -107,10 +109,12 @@ impl ChanceOfChanges {
     }
 }
 
-/// By candidate: T that a tenth of the draws exceed.
-fn quantiles(draws: &[Vec<f64>], count: usize) -> Vec<f64> {
-    let of = |k: usize| quantile(draws.iter().map(|d| d[k]).collect(), 0.9);
-    (0..count).map(of).collect()
+/// By candidate: T that a tenth of the draws exceed, and what is asked beyond.
+fn quantiles(draws: &[Vec<f64>], design: &Scope) -> Vec<f64> {
+    let of = |(k, moved): (usize, &Moved)| {
+        quantile(draws.iter().map(|d| d[k]).collect(), 0.9) + asked_more(*moved)
+    };
+    design.moved.iter().enumerate().map(of).collect()
 }
 
 /// The largest excess of T over its quantile.
@@ -270,4 +274,42 @@ fn tail(values: Vec<f64>, level: f64) -> f64 {
         .collect();
     let mean = above.iter().sum::<f64>() / above.len().max(1) as f64;
     start + mean.max(LEAST_MEAN) * (PART / level).ln()
+}
+
+/// Samples that are simulated in place of all: every recording has one, for what other recordings on the other side gain by chance grows with
+/// their number, not with that of their samples.
+pub(super) fn thinned(used: &[usize], borders: &[usize]) -> Vec<usize> {
+    let recording = |sample: &usize| borders.partition_point(|b| b <= sample);
+    let mut out = every(used, used.len().div_ceil(SIMULATED));
+    let mut seen: BTreeSet<usize> = out.iter().map(recording).collect();
+    out.extend(used.iter().filter(|s| seen.insert(recording(s))));
+    out.sort_unstable();
+    out
+}
+
+pub(super) fn every(samples: &[usize], stride: usize) -> Vec<usize> {
+    samples.iter().step_by(stride).copied().collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::thinned;
+
+    /// 100 recordings of 2 and 200 of 9 samples, of which some were not used.
+    #[test]
+    fn every_recording_is_simulated() {
+        let starts: Vec<usize> = (0..100).map(|r| 2 * r).collect();
+        let mut borders = starts[1..].to_vec();
+        borders.extend((0..200).map(|r| 200 + 9 * r));
+        let used: Vec<usize> = (0..2000).filter(|s| s % 9 != 4).collect();
+        let recording = |s: &usize| borders.partition_point(|b| b <= s);
+        let all: Vec<usize> = used.iter().map(recording).collect();
+        let mut simulated: Vec<usize> = thinned(&used, &borders).iter().map(recording).collect();
+        simulated.dedup();
+        let mut expected = all;
+        expected.dedup();
+        assert_eq!(simulated, expected);
+        // Where every recording has one already, nothing is added.
+        assert_eq!(thinned(&used[..240], &[100]), used[..240]);
+    }
 }

@@ -26,6 +26,9 @@ pub(crate) enum Pattern {
     Constant,
 }
 
+/// Joints whose zeros are asked for together, at most: every range of rows costs their third power.
+const MOST_ZEROS: usize = 32;
+
 /// Time constant of [`Pattern::Settling`], in parts of all samples: half to twice as long are distinguished from a step and from an even drift.
 const SETTLING: f64 = 0.25;
 
@@ -77,7 +80,7 @@ impl Candidates {
             middles: Vec::new(),
             body_middles: Vec::new(),
         };
-        for (measurement, path) in model.problem.measurements.iter().zip(&model.paths) {
+        for measurement in model.problem.measurements.iter() {
             if !sees_places(&measurement.kind) {
                 continue;
             }
@@ -103,15 +106,8 @@ impl Candidates {
                 let first = out.add(Moved::Scale(from), Pattern::Constant, 1);
                 out.scales.push((from, first));
             }
-            for step in &path.steps {
-                if let Step::Joint { edge, .. } = step
-                    && out.joints.iter().all(|(e, _)| e != edge)
-                {
-                    let first = out.add(Moved::Joint(EdgeId::of(*edge)), Pattern::Step, 1);
-                    out.joints.push((*edge, first));
-                }
-            }
         }
+        out.add_joints(solution);
         out.find_middles(solution);
         out.find_body_middles(solution);
         out
@@ -126,6 +122,32 @@ impl Candidates {
             columns: first..self.width,
         });
         first
+    }
+
+    /// Each joint, and the zeros of all of them together: the same columns.
+    fn add_joints(&mut self, solution: &Solution) {
+        let model = &solution.model;
+        let all = self.width;
+        for (measurement, path) in model.problem.measurements.iter().zip(&model.paths) {
+            if !sees_places(&measurement.kind) {
+                continue;
+            }
+            for step in &path.steps {
+                if let Step::Joint { edge, .. } = step
+                    && self.joints.iter().all(|(e, _)| e != edge)
+                {
+                    let first = self.add(Moved::Joint(EdgeId::of(*edge)), Pattern::Step, 1);
+                    self.joints.push((*edge, first));
+                }
+            }
+        }
+        if (2..=MOST_ZEROS).contains(&self.joints.len()) {
+            self.list.push(Candidate {
+                moved: Moved::Zeros,
+                pattern: Pattern::Step,
+                columns: all..self.width,
+            });
+        }
     }
 
     fn find_middles(&mut self, solution: &Solution) {
@@ -185,6 +207,15 @@ impl Candidates {
     pub(crate) fn middle(&self, frame: FrameId) -> Vector3<f64> {
         let known = self.middles.iter().find(|(f, _)| *f == frame);
         known.map_or_else(Vector3::zeros, |(_, middle)| *middle)
+    }
+
+    /// The joints whose steps a candidate holds.
+    pub(crate) fn joints_of(&self, candidate: usize) -> Vec<EdgeId> {
+        match self.list[candidate].moved {
+            Moved::Joint(edge) => vec![edge],
+            Moved::Zeros => self.joint_columns().0,
+            _ => Vec::new(),
+        }
     }
 
     /// Joints, and the column of each.

@@ -100,7 +100,8 @@ impl Solution {
         quantile: f64,
     ) -> Option<Change> {
         let what = scanned.candidates.list[candidate].moved;
-        if best.level != 0 || turned(what, &best.found.jump, self) < TURNED {
+        let joints = scanned.candidates.joints_of(candidate);
+        if best.level != 0 || turned(&joints, &best.found.jump, self) < TURNED {
             return None;
         }
         let design = scanned.design;
@@ -110,9 +111,12 @@ impl Solution {
         for _ in 0..ROUNDS {
             let inside = |sample: usize| design.contains(&best.found.after, sample);
             match what {
-                Moved::Joint(edge) => {
-                    size[0] += found.jump[0];
-                    shift_readings(&mut corrected, edge, found.jump[0], &inside);
+                Moved::Joint(_) | Moved::Zeros => {
+                    for ((edge, by), size) in joints.iter().zip(&found.jump).zip(&mut size) {
+                        *size += by;
+                        shift_readings(&mut corrected, *edge, *by, &inside);
+                    }
+                    corrected.model.trig = tabulate(&corrected.model.problem);
                 }
                 Moved::Body(_) | Moved::Reference(_) => {
                     let step = pose_of(&found.jump);
@@ -142,7 +146,8 @@ impl Solution {
                     },
                     level: 0,
                 };
-                return Some(change(what, &exact, design, quantile));
+                let of = (scanned.candidates, candidate);
+                return Some(change(of, &exact, design, quantile));
             }
         }
         None
@@ -215,22 +220,20 @@ fn shift_readings(of: &mut Solution, edge: EdgeId, by: f64, inside: &dyn Fn(usiz
             .filter(|(sample, _)| inside(*sample))
             .for_each(|(_, q)| *q += by);
     }
-    of.model.trig = tabulate(&of.model.problem);
 }
 
-/// Angle of a jump, rad.
-pub(super) fn turned(what: Moved, jump: &[f64], of: &Solution) -> f64 {
-    match what {
-        Moved::Joint(edge) => match &of.model.problem.edges[edge.index()].kind {
-            EdgeKind::Joint(joint) if matches!(joint.axis, Axis::Revolute(_)) => jump[0].abs(),
-            _ => 0.0,
-        },
-        _ => jump[..3.min(jump.len())]
-            .iter()
-            .map(|x| x * x)
-            .sum::<f64>()
-            .sqrt(),
+/// Angle of a jump, rad; `joints`: whose steps it holds, the largest of which counts.
+pub(super) fn turned(joints: &[EdgeId], jump: &[f64], of: &Solution) -> f64 {
+    if joints.is_empty() {
+        let turn = &jump[..3.min(jump.len())];
+        return turn.iter().map(|x| x * x).sum::<f64>().sqrt();
     }
+    let turns = |edge: &EdgeId| match &of.model.problem.edges[edge.index()].kind {
+        EdgeKind::Joint(joint) => matches!(joint.axis, Axis::Revolute(_)),
+        _ => false,
+    };
+    let steps = joints.iter().zip(jump).filter(|(edge, _)| turns(edge));
+    steps.map(|(_, step)| step.abs()).fold(0.0, f64::max)
 }
 
 fn pose_of(jump: &[f64]) -> Isometry3<f64> {

@@ -30,22 +30,24 @@ mod exact;
 mod levels;
 mod scatter;
 mod sums;
+mod together;
 
 use std::cmp::Ordering;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use serde::{Deserialize, Serialize};
 
 use crate::analysis::solution::Solution;
 use crate::graph::ids::{EdgeId, FrameId};
 pub use chance::ChanceOfChanges;
-use chance::Scope;
+use chance::{Scope, every, thinned};
 use columns::Candidates;
 use dependent::{Seen, in_blocks};
 use exact::{Scanned, turned};
 use levels::{Best, Levels, Tests};
 pub use scatter::{BesideScatter, Left, Scatter};
-use sums::{Design, LEAST, SIMULATED};
+use sums::{Design, LEAST};
+use together::{asked_more, leave_what_is_simpler};
 
 /// What may have moved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -59,6 +61,8 @@ pub enum Moved {
     Reference(FrameId),
     /// The zero of a joint, by a step, rad or m.
     Joint(EdgeId),
+    /// The zeros of all joints, each by a step of its own, as where a robot was homed; rad or m, in the order of [`Change::joints`].
+    Zeros,
     /// The measuring frame, evenly over the samples; `[ω; v]` from first to last.
     Drift(FrameId),
     /// The measuring frame, fast at first and slower later, as what warms up; `[ω; v]` from first to last.
@@ -121,6 +125,8 @@ pub struct Change {
     pub explains: f64,
     /// ĉ of equation (2).
     pub jump: Vec<f64>,
+    /// The joints whose steps the jump holds; empty for what is no step of joints.
+    pub joints: Vec<EdgeId>,
     /// Its standard deviations, for noise as found and the memory that successive samples show beside it.
     pub sigma: Vec<f64>,
 }
@@ -157,9 +163,11 @@ impl ChangeScan {
             return Vec::new();
         };
         let others = self.changes.iter().skip(1);
-        others
-            .filter(|c| c.excess > best.excess - DISTINCT && c.excess > self.threshold)
-            .collect()
+        let is_alike = |c: &&Change| {
+            let excess = c.excess + asked_more(c.moved);
+            excess > best.excess - DISTINCT && excess > self.threshold
+        };
+        others.filter(is_alike).collect()
     }
 }
 
@@ -254,7 +262,7 @@ impl Solution {
             };
             if let Some(near) = &near {
                 let design = near.scanned(coarse).design;
-                *change_of = change(change_of.moved, &near.best, design, quantile);
+                *change_of = change((coarse.candidates, *k), &near.best, design, quantile);
             }
             if change_of.excess <= chance.threshold || change_of.explains < least {
                 continue;
@@ -284,7 +292,7 @@ impl Solution {
         while let Some((k, first)) = changes.first()
             && first.excess > chance.threshold
             && let Some(best) = found[*k].as_ref().filter(|best| best.level == 0)
-            && turned(first.moved, &best.found.jump, self) < FAR
+            && turned(&first.joints, &best.found.jump, self) < FAR
             && !memory.contains_key(k)
         {
             // Each is asked beside itself: a change is no memory, and is one beside another.
@@ -376,10 +384,10 @@ impl Solution {
         let simulate = || self.chance_by(&candidates, (&levels, &tests), Some(&seen), settings);
         let mut chance = known.cloned().or_else(simulate)?;
         let mut changes: Vec<(usize, Change)> = Vec::new();
-        for (k, (candidate, found)) in candidates.list.iter().zip(&found).enumerate() {
+        for (k, found) in found.iter().enumerate() {
             if let Some(found) = found {
                 let (quantile, at) = (chance.quantiles[k], &levels.designs[found.level]);
-                changes.push((k, change(candidate.moved, found, at, quantile)));
+                changes.push((k, change((&candidates, k), found, at, quantile)));
             }
         }
         changes.sort_by(by_excess);
@@ -396,6 +404,7 @@ impl Solution {
             let wider = memory.get(k).map_or(1.0, |memory| memory.sqrt());
             change.sigma.iter_mut().for_each(|sigma| *sigma *= wider);
         }
+        leave_what_is_simpler(&mut changes);
         Some(ChangeScan {
             changes: changes.into_iter().map(|(_, c)| c).collect(),
             threshold: chance.threshold,
@@ -431,28 +440,19 @@ fn mostly<'a>(rejected: impl Iterator<Item = &'a bool>) -> bool {
     false
 }
 
-/// Samples that are simulated in place of all: every recording has one, for what other recordings on the other side gain by chance grows with
-/// their number, not with that of their samples.
-fn thinned(used: &[usize], borders: &[usize]) -> Vec<usize> {
-    let recording = |sample: &usize| borders.partition_point(|b| b <= sample);
-    let mut out = every(used, used.len().div_ceil(SIMULATED));
-    let mut seen: BTreeSet<usize> = out.iter().map(recording).collect();
-    out.extend(used.iter().filter(|s| seen.insert(recording(s))));
-    out.sort_unstable();
-    out
-}
-
-fn every(samples: &[usize], stride: usize) -> Vec<usize> {
-    samples.iter().step_by(stride).copied().collect()
-}
-
-fn change(moved: Moved, best: &Best, design: &Design, quantile: f64) -> Change {
+fn change(
+    (candidates, k): (&Candidates, usize),
+    best: &Best,
+    design: &Design,
+    quantile: f64,
+) -> Change {
     let Best { found, score, .. } = best;
     let (first, end) = design.samples_of(&found.after);
     // Noise as found: s² = (F − Δ) / ν. N would make the jumps of ten poses look three times as certain as they are.
     let s2 = (design.cost - found.gain) / design.freedom(found.jump.len());
     Change {
-        moved,
+        moved: candidates.list[k].moved,
+        joints: candidates.joints_of(k),
         first,
         end,
         also: design.also(&found.after),
@@ -465,28 +465,5 @@ fn change(moved: Moved, best: &Best, design: &Design, quantile: f64) -> Change {
             .iter()
             .map(|v| (v * s2.max(0.0)).sqrt())
             .collect(),
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::thinned;
-
-    /// 100 recordings of 2 and 200 of 9 samples, of which some were not used.
-    #[test]
-    fn every_recording_is_simulated() {
-        let starts: Vec<usize> = (0..100).map(|r| 2 * r).collect();
-        let mut borders = starts[1..].to_vec();
-        borders.extend((0..200).map(|r| 200 + 9 * r));
-        let used: Vec<usize> = (0..2000).filter(|s| s % 9 != 4).collect();
-        let recording = |s: &usize| borders.partition_point(|b| b <= s);
-        let all: Vec<usize> = used.iter().map(recording).collect();
-        let mut simulated: Vec<usize> = thinned(&used, &borders).iter().map(recording).collect();
-        simulated.dedup();
-        let mut expected = all;
-        expected.dedup();
-        assert_eq!(simulated, expected);
-        // Where every recording has one already, nothing is added.
-        assert_eq!(thinned(&used[..240], &[100]), used[..240]);
     }
 }

@@ -22,6 +22,7 @@ use crate::analysis::change::columns::{Candidates, Pattern};
 use crate::analysis::change::contest::holds;
 use crate::analysis::change::{Change, Moved};
 use crate::analysis::solution::Solution;
+use crate::graph::ids::EdgeId;
 use crate::solve::equations::Workspace;
 use crate::solve::whitened::Whitened;
 
@@ -194,6 +195,7 @@ impl<'a> Changed<'a> {
     fn displacement(&self, component: usize, posture: &MovedPoint) -> Vector3<f64> {
         let axis = Vector3::ith(component % 3, 1.0);
         let turns = component < 3;
+        let by = |edge: &EdgeId| posture.by.get(edge).copied().unwrap_or_default();
         match self.change.moved {
             Moved::Body(_) if !self.carries => Vector3::zeros(),
             Moved::Body(frame) if turns => {
@@ -205,7 +207,7 @@ impl<'a> Changed<'a> {
                 let lever = posture.point.position.coords - self.candidates.middle(frame);
                 if turns { axis.cross(&lever) } else { axis }
             }
-            Moved::Joint(edge) => posture.by.get(&edge).copied().unwrap_or_default(),
+            Moved::Joint(_) | Moved::Zeros => by(&self.change.joints[component]),
             Moved::Scale(_) => posture.point.position.coords,
         }
     }
