@@ -257,4 +257,27 @@ fn a_gantry_whose_joints_are_called_x_y_and_z_is_read() {
     let named = gantry(None, 3);
     let residual = |report: &Value| report["fit"]["chi2_per_dof"].as_f64().expect("a number");
     assert_eq!(residual(&report), residual(&run(&named)));
+
+    // What uses the result reads them as the run did.
+    const MODEL: &str = "out/gantry.calibrated.model.json";
+    let [own, other] = [&dir, &named].map(|dir| {
+        let ran = dir.calib(["predict", MODEL, "gantry/checks.csv"]);
+        assert!(!ran.stderr.contains("without a column"), "{}", ran.stderr);
+        ran.stdout
+    });
+    // Without the scope, which names a joint where a row is outside.
+    let rows = |text: &str| -> Vec<String> {
+        let cells = text.lines().map(|line| line.splitn(3, ','));
+        cells
+            .map(|cells| cells.last().unwrap_or_default().to_owned())
+            .collect()
+    };
+    assert!(rows(&own).len() > 5);
+    assert_eq!(rows(&own), rows(&other));
+    let ran = dir.calib(["correct", MODEL, "gantry/checks.csv"]);
+    let header = ran.stdout.lines().next().unwrap_or_default();
+    assert!(
+        header.starts_with("line,joint:x_m,joint:y_m,joint:z_m,gc_deg"),
+        "{header}"
+    );
 }

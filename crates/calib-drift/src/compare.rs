@@ -34,6 +34,9 @@ pub struct Changed {
     pub p_value: f64,
     /// The same for the whole list (Holm).
     pub p_adjusted: f64,
+    /// p-value if the noise were known as well as all residuals together show it.
+    #[serde(skip)]
+    pub(crate) p_of_known_noise: f64,
     /// Said to have changed.
     pub significant: bool,
     /// Free of any choice of frames.
@@ -51,8 +54,21 @@ pub struct Joint {
     pub noise_degrees_of_freedom: f64,
     /// Probability of such a distance where nothing changed.
     pub p_value: f64,
+    /// The same if the noise were known as well as all residuals together show it.
+    #[serde(skip)]
+    pub(crate) p_of_known_noise: f64,
     /// Said to have changed.
     pub significant: bool,
+}
+
+/// Why it is not decided whether anything changed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Undecided {
+    /// One of them estimates parameters that the other holds at their nominal values, and what they differ by may be these.
+    OtherParameters,
+    /// They differ by more than the noise as it was found explains, but a level of it is known from too few data.
+    NoiseHardlyKnown,
 }
 
 /// What two calibrations say together.
@@ -70,6 +86,8 @@ pub struct Drift {
     pub false_alarms: f64,
     /// Anything changed.
     pub changed: bool,
+    /// Why that is not known.
+    pub undecided: Option<Undecided>,
     /// Everything at once.
     pub joint: Joint,
     /// Number by number, most certain first.
@@ -135,14 +153,22 @@ pub fn compare(old: &Evidence, new: &Evidence) -> Result<Drift, DriftError> {
         .filter_map(|(number, other)| change(old, number, new, other))
         .collect();
     holm(&mut numbers);
-    let changed = joint.significant || numbers.iter().any(|n| n.significant);
+    let (only_old, only_new) = (named(old, new), named(new, old));
+    let same_parameters = only_old.is_empty() && only_new.is_empty();
+    let differ = joint.significant || numbers.iter().any(|n| n.significant);
+    let undecided = match (differ, same_parameters) {
+        (true, false) => Some(Undecided::OtherParameters),
+        (false, _) => hidden_by_noise(&joint, &numbers).then_some(Undecided::NoiseHardlyKnown),
+        (true, true) => None,
+    };
     Ok(Drift {
         calib_drift: 1,
         robot: new.robot.clone(),
         old: old.file.clone(),
         new: new.file.clone(),
         false_alarms: FALSE_ALARMS,
-        changed,
+        changed: differ && undecided.is_none(),
+        undecided,
         joint,
         numbers,
         known_in_one,
@@ -150,9 +176,17 @@ pub fn compare(old: &Evidence, new: &Evidence) -> Result<Drift, DriftError> {
         not_credible,
         directions_not_credible: old.not_credible().max(new.not_credible()),
         same_nominal,
-        only_old: named(old, new),
-        only_new: named(new, old),
+        only_old,
+        only_new,
     })
+}
+
+/// Whether something would have changed if the noise were known.
+fn hidden_by_noise(joint: &Joint, numbers: &[Changed]) -> bool {
+    let limit = 0.5 * FALSE_ALARMS;
+    let of_numbers = numbers.iter().map(|n| n.p_of_known_noise);
+    let least = of_numbers.fold(f64::INFINITY, f64::min);
+    joint.p_of_known_noise < limit || least * (numbers.len() as f64) < limit
 }
 
 fn same_robot(old: &Evidence, new: &Evidence) -> Result<(), DriftError> {
@@ -272,20 +306,23 @@ const INDEPENDENT: f64 = 1e-6;
 /// The test of a squared distance; `shares`: the old calibration's in each of its directions.
 fn tested(statistic: f64, shares: &[f64], old: &Evidence, new: &Evidence) -> Joint {
     let degrees = shares.len();
-    let dof = match degrees {
-        0 => old.degrees_of_freedom + new.degrees_of_freedom,
-        _ => combined(shares, old.degrees_of_freedom, new.degrees_of_freedom),
+    let freedom = |first: f64, second: f64| match degrees {
+        0 => first + second,
+        _ => combined(shares, first, second),
     };
-    let p_value = if degrees == 0 {
-        1.0
-    } else {
-        chance::f_tail(statistic / degrees as f64, degrees as f64, dof.max(1.0))
+    let p_of = |dof: f64| match degrees {
+        0 => 1.0,
+        _ => chance::f_tail(statistic / degrees as f64, degrees as f64, dof.max(1.0)),
     };
+    let dof = freedom(old.degrees_of_freedom, new.degrees_of_freedom);
+    let known = freedom(old.of_residuals, new.of_residuals);
+    let p_value = p_of(dof);
     Joint {
         statistic,
         degrees_of_freedom: degrees,
         noise_degrees_of_freedom: dof,
         p_value,
+        p_of_known_noise: p_of(known),
         significant: p_value < 0.5 * FALSE_ALARMS,
     }
 }
@@ -378,7 +415,9 @@ fn change(
     // t² is F(1, ν), ν by (3).
     let share = old_variance / sigma.powi(2);
     let dof = combined(&[share], old.degrees_of_freedom, new.degrees_of_freedom);
-    let p_value = chance::f_tail((change / sigma).powi(2), 1.0, dof);
+    let known = combined(&[share], old.of_residuals, new.of_residuals);
+    let p_of = |dof: f64| chance::f_tail((change / sigma).powi(2), 1.0, dof);
+    let p_value = p_of(dof);
     Some(Changed {
         name: old_number.name.clone(),
         text: old_number.text.clone(),
@@ -390,6 +429,7 @@ fn change(
         degrees_of_freedom: dof,
         p_value,
         p_adjusted: 1.0,
+        p_of_known_noise: p_of(known),
         significant: false,
         gauge_free: old_number.gauge_free,
     })

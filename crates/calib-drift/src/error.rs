@@ -47,7 +47,7 @@ pub enum DriftError {
     },
     /// No parameter of the robot is estimated in both.
     #[error(
-        "{old} and {new} have nothing of the robot in common that both determine\n  help: estimate the same parameters in both calibrations"
+        "{old} and {new} have nothing of the robot in common that both determine\n  help: estimate the same parameters in both calibrations, of joints that have the same names in both URDFs"
     )]
     NothingInCommon {
         /// The old report.

@@ -62,6 +62,8 @@ pub struct Evidence {
     pub credible: usize,
     /// Degrees of freedom of the noise: those of the level that is known worst.
     pub degrees_of_freedom: f64,
+    /// Degrees of freedom of all residuals together.
+    pub of_residuals: f64,
     /// What can be compared.
     pub numbers: Vec<Number>,
 }
@@ -239,6 +241,7 @@ impl Evidence {
             rank,
             credible,
             degrees_of_freedom: degrees_of_freedom(info, report),
+            of_residuals: info.degrees_of_freedom,
             numbers: Vec::new(),
         };
         evidence.numbers = numbers(info, &parameters, &evidence.scale);

@@ -8,7 +8,7 @@ use std::path::Path;
 use calib_report::Unit;
 use serde::Serialize;
 
-use crate::compare::compare;
+use crate::compare::{Drift, compare};
 use crate::error::DriftError;
 use crate::evidence::Evidence;
 
@@ -19,9 +19,11 @@ pub struct Calibration {
     pub report: String,
     /// When it was measured, as its profile states it.
     pub date: Option<String>,
-    /// Whether the robot changed since the calibration before, at a false-alarm rate of 1 %; null for the first, and where the two have
-    /// nothing in common.
+    /// Whether the robot changed since the calibration before, at a false-alarm rate of 1 %; null for the first, and where that is not
+    /// decided or the two have nothing in common.
     pub changed: Option<bool>,
+    /// Whether it changed since the first calibration, by the same test; null for the first two, and where that is not known.
+    pub changed_since_first: Option<bool>,
     /// Names of what changed since the calibration before, most certain first.
     pub what: Vec<String>,
 }
@@ -96,15 +98,15 @@ pub fn history(reports: &[impl AsRef<Path>]) -> Result<History, DriftError> {
     let mut calibrations: Vec<Calibration> = Vec::new();
     for (i, (date, evidence)) in all.iter().enumerate() {
         let before = i.checked_sub(1).and_then(|before| all.get(before));
-        let drift = match before.map(|(_, before)| compare(before, evidence)) {
-            None | Some(Err(DriftError::NothingInCommon { .. })) => None,
-            Some(drift) => Some(drift?),
-        };
+        let drift = before.map_or(Ok(None), |(_, before)| decided(before, evidence))?;
+        let first = all.first().filter(|_| i > 1);
+        let since_first = first.map_or(Ok(None), |(_, first)| decided(first, evidence))?;
         let significant = drift.iter().flat_map(|d| &d.numbers);
         calibrations.push(Calibration {
             report: evidence.file.clone(),
             date: date.clone(),
             changed: drift.as_ref().map(|d| d.changed),
+            changed_since_first: since_first.map(|d| d.changed),
             what: significant
                 .filter(|n| n.significant && n.gauge_free)
                 .map(|n| n.text.clone())
@@ -120,6 +122,15 @@ pub fn history(reports: &[impl AsRef<Path>]) -> Result<History, DriftError> {
         calibrations,
         quantities: tracks(&evidence),
     })
+}
+
+/// The comparison of two calibrations, where it decides anything.
+fn decided(old: &Evidence, new: &Evidence) -> Result<Option<Drift>, DriftError> {
+    match compare(old, new) {
+        Err(DriftError::NothingInCommon { .. }) => Ok(None),
+        Ok(drift) if drift.undecided.is_some() => Ok(None),
+        drift => drift.map(Some),
+    }
 }
 
 /// What any of the calibrations determines, what changed most first.

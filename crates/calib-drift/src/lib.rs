@@ -31,7 +31,7 @@ mod history;
 mod render;
 mod render_history;
 
-pub use compare::{Changed, Drift, Joint, compare};
+pub use compare::{Changed, Drift, Joint, Undecided, compare};
 pub use error::DriftError;
 pub use evidence::{Evidence, Number};
 pub use history::{Calibration, History, Track, Value, history};

@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use calib_report::{number, printable_line, terminal};
 
-use crate::compare::{Changed, Drift};
+use crate::compare::{Changed, Drift, Undecided};
 use crate::error::DriftError;
 
 /// For a terminal, at most 80 columns: the answer first, then what moved and by how much.
@@ -17,11 +17,7 @@ pub fn text(drift: &Drift) -> String {
     let significant: Vec<&Changed> = drift.numbers.iter().filter(|n| n.significant).collect();
     let (free, entangled): (Vec<&Changed>, Vec<&Changed>) =
         significant.iter().partition(|n| n.gauge_free);
-    out += match (drift.changed, significant.is_empty()) {
-        (false, _) => "NO SIGNIFICANT CHANGE\n",
-        (true, false) => "CHANGED\n",
-        (true, true) => "CHANGED, and no single number shows where\n",
-    };
+    out += &headline(drift, &significant);
     out += &terminal::wrapped(
         &format!(
             "all at once: squared distance {:.1}, p {} ({} directions that both recordings see)",
@@ -42,11 +38,15 @@ pub fn text(drift: &Drift) -> String {
         "- ",
         "  ",
     );
-    section(&mut out, "What moved", &free);
+    let moved = match drift.undecided {
+        Some(_) => "What differs",
+        None => "What moved",
+    };
+    section(&mut out, moved, &free);
     section(
         &mut out,
         if free.is_empty() {
-            "What moved"
+            moved
         } else {
             "The same in the parameters' own frames"
         },
@@ -107,6 +107,44 @@ pub fn text(drift: &Drift) -> String {
         );
     }
     out
+}
+
+/// The answer.
+fn headline(drift: &Drift, significant: &[&Changed]) -> String {
+    let changed = match (drift.undecided, drift.changed, significant.is_empty()) {
+        (Some(why), ..) => {
+            let remedy = terminal::wrapped(why.remedy(), "", "  ");
+            return format!("{}{remedy}", why.headline());
+        }
+        (None, false, _) => "NO SIGNIFICANT CHANGE\n",
+        (None, true, false) => "CHANGED\n",
+        (None, true, true) => "CHANGED, and no single number shows where\n",
+    };
+    changed.to_owned()
+}
+
+impl Undecided {
+    fn headline(self) -> &'static str {
+        match self {
+            Self::OtherParameters => "NOT DECIDED: the calibrations estimate other parameters\n",
+            Self::NoiseHardlyKnown => "NOT DECIDED: the noise is known from too few data\n",
+        }
+    }
+
+    /// Why, and what to do.
+    #[must_use]
+    pub fn remedy(self) -> &'static str {
+        match self {
+            Self::OtherParameters => {
+                "They differ, but what only one of them estimates is held at its nominal value in the other, and the rest makes up for it. Calibrate \
+                 both with the same `solve.free` and the same effects."
+            }
+            Self::NoiseHardlyKnown => {
+                "They differ by more than the noise as it was found explains, but one level of it is so uncertain that chance could. Record more \
+                 poses, or state that level in the profile."
+            }
+        }
+    }
 }
 
 fn section(out: &mut String, heading: &str, rows: &[&Changed]) {

@@ -14,13 +14,18 @@ fn named(i: usize, of: &Calibration) -> String {
     format!("{}  {date}", i + 1)
 }
 
-/// Since the calibration before.
-fn since(of: &Calibration) -> String {
-    match of.changed {
-        None => String::new(),
+/// Since the calibration before the one at place `i`, and since the first.
+fn since((i, of): (usize, &Calibration)) -> String {
+    let step = match of.changed {
+        None if i == 0 => String::new(),
+        None => "not decided: see calib drift".to_owned(),
         Some(false) => "no significant change".to_owned(),
         Some(true) if of.what.is_empty() => "CHANGED".to_owned(),
         Some(true) => format!("CHANGED: {}", of.what.join("; ")),
+    };
+    match (of.changed, of.changed_since_first) {
+        (Some(true), _) | (_, None | Some(false)) => step,
+        (_, Some(true)) => format!("{step}, CHANGED since the first"),
     }
 }
 
@@ -48,7 +53,7 @@ pub fn history_text(history: &History) -> String {
         }
     );
     for (i, of) in history.calibrations.iter().enumerate() {
-        let line = format!("{}  {}", of.report, since(of));
+        let line = format!("{}  {}", of.report, since((i, of)));
         out += &terminal::wrapped(line.trim_end(), &format!("{}  ", named(i, of)), "      ");
     }
     for track in &history.quantities {
@@ -76,7 +81,7 @@ pub fn history_page(history: &History) -> String {
         .iter()
         .enumerate()
         .map(|(i, of)| {
-            let line = format!("{}  {}  {}", named(i, of), of.report, since(of));
+            let line = format!("{}  {}  {}", named(i, of), of.report, since((i, of)));
             line.trim_end().to_owned()
         })
         .collect();

@@ -1,8 +1,10 @@
 //! `calib drift` keeps its promise: an unchanged robot is said to have changed in 1 % of the comparisons at most, whatever
 //! conventions, priors and mounts are in between, and a real change is found.
 
-use calib_drift::{Drift, Evidence, FALSE_ALARMS, compare};
-use calib_report::{DataInformation, Input, Output, Parameter, Quantity, Report, Term, Unit};
+use calib_drift::{Drift, Evidence, FALSE_ALARMS, Undecided, compare};
+use calib_report::{
+    DataInformation, Input, Noise, NoiseKind, Output, Parameter, Quantity, Report, Term, Unit,
+};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
@@ -291,6 +293,52 @@ fn parameters_of_one_calibration_only_are_named() {
     assert_eq!(drift.only_old, ["elbow.x"]);
     assert_eq!(drift.only_new, ["elbow.gain"]);
     assert_eq!(drift.joint.degrees_of_freedom, 3);
+}
+
+/// What one of them holds, the rest makes up for.
+#[test]
+fn a_difference_of_calibrations_with_other_parameters_is_not_decided() {
+    let mut rng = ChaCha8Rng::seed_from_u64(80);
+    let of = |r: &Report| Evidence::of(r, "report.json").expect("a report");
+    let mut moved = SAME_ROBOT;
+    moved[3] += 2e-3;
+    let (old, mut new) = (session(&mut rng, &ROBOT), session(&mut rng, &moved));
+    assert!(compare(&of(&old), &of(&new)).expect("one robot").changed);
+    new.parameters[2].name = "elbow.gain".to_owned();
+    let info = new.data_information.as_mut().expect("information");
+    info.parameters[2] = "elbow.gain".to_owned();
+    let drift = compare(&of(&old), &of(&new)).expect("one robot");
+    assert!(!drift.changed && drift.joint.significant);
+    assert_eq!(drift.undecided, Some(Undecided::OtherParameters));
+    let text = calib_drift::text(&drift);
+    assert!(text.contains("NOT DECIDED"), "{text}");
+    assert!(text.lines().all(|l| l.chars().count() <= 80), "{text}");
+}
+
+/// A level of one degree of freedom hides what the residuals show; an unchanged robot is unchanged beside it.
+#[test]
+fn a_difference_that_a_hardly_known_noise_hides_is_not_decided() {
+    let mut rng = ChaCha8Rng::seed_from_u64(81);
+    let of = |r: &Report| Evidence::of(r, "report.json").expect("a report");
+    let mut undecided = 0;
+    for by in [0.0, 6e-4] {
+        for _ in 0..50 {
+            let mut moved = SAME_ROBOT;
+            moved[3] += by;
+            let (old, mut new) = (session(&mut rng, &ROBOT), session(&mut rng, &moved));
+            new.noise.push(Noise {
+                kind: NoiseKind::Orientation,
+                relative_error: Some(0.65),
+                ..Noise::default()
+            });
+            let drift = compare(&of(&old), &of(&new)).expect("one robot");
+            let hidden = drift.undecided == Some(Undecided::NoiseHardlyKnown);
+            undecided += usize::from(by == 0.0 && hidden);
+            assert!(!drift.changed);
+            assert!(by == 0.0 || hidden, "{drift:#?}");
+        }
+    }
+    assert!(undecided <= 3, "{undecided} of 50 unchanged robots");
 }
 
 #[test]

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use calib_finding::cell;
 use calib_model::{Aim, Approach, Correction, ModelError, Options, Outcome, Pose, Under};
+use calib_recording::joint_column;
 
 use crate::error::ExportError;
 use crate::read::Robot;
@@ -177,7 +178,7 @@ impl Corrected {
 fn columns(robot: &Robot) -> impl Iterator<Item = (String, bool)> + '_ {
     robot.model.joints().iter().map(|j| {
         let unit = if j.prismatic { "m" } else { "deg" };
-        (format!("{}_{unit}", j.name), j.prismatic)
+        (joint_column(&j.name, unit), j.prismatic)
     })
 }
 

@@ -44,7 +44,13 @@ impl Program {
 /// Reads a table of joint positions in any format that `calib` reads.
 pub(crate) fn program(path: &Path, model: &Model) -> Result<Program, ExportError> {
     let file = path.display().to_string();
-    let recording = read_path(path, &ReadOptions::default())?;
+    // Columns `x_mm`, `y_mm` and `z_mm` are those of a gantry's joints of these names.
+    let options = ReadOptions {
+        joints: model.joints().iter().map(|j| j.name.clone()).collect(),
+        of_robot: true,
+        ..ReadOptions::default()
+    };
+    let recording = read_path(path, &options)?;
     let poses = recording
         .poses(Filled::Include)
         .map_err(|source| ExportError::NotOneTable {

@@ -48,6 +48,7 @@ pub use poses::{NotOneTable, Poses};
 pub use readers::{ReadOptions, RotationForm, read_bytes, read_path, read_path_with};
 pub use rename::renamed_comment;
 pub use table::{
-    NotWritten, WRITTEN_LIVE, WriteOptions, write_mapped, write_poses, write_recording,
+    NotWritten, WRITTEN_LIVE, WriteOptions, joint_column, write_mapped, write_poses,
+    write_recording,
 };
 pub use units::{AngleUnit, LengthUnit, TimeUnit};

@@ -28,9 +28,9 @@ pub fn run(options: &Drift) -> Result<ExitCode, CliError> {
     } else {
         calib_drift::text(&drift)
     })?;
-    Ok(if drift.changed {
-        ExitCode::VerdictFail
-    } else {
-        ExitCode::Accepted
+    Ok(match (drift.undecided, drift.changed) {
+        (Some(_), _) => ExitCode::NotObservable,
+        (None, true) => ExitCode::VerdictFail,
+        (None, false) => ExitCode::Accepted,
     })
 }

@@ -126,16 +126,21 @@ impl Robot {
 
     /// The same with its changes.
     pub(crate) fn compared(mut self, report: &Report, drift: Result<Drift, DriftError>) -> Self {
+        let not_compared = |text: String| Failure {
+            id: "drift".to_owned(),
+            text,
+        };
         let drift = match drift {
             Ok(drift) => drift,
             Err(error) => {
-                self.not_compared = Some(Failure {
-                    id: "drift".to_owned(),
-                    text: error.to_string(),
-                });
+                self.not_compared = Some(not_compared(error.to_string()));
                 return self;
             }
         };
+        if let Some(why) = drift.undecided {
+            self.not_compared = Some(not_compared(why.remedy().to_owned()));
+            return self;
+        }
         for changed in &drift.numbers {
             let known = self.quantities.iter().position(|q| q.name == changed.name);
             let quantity = Quantity {

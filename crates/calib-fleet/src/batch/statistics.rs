@@ -63,6 +63,9 @@ pub struct Statistics {
     pub false_alarms: f64,
     /// Robots that were compared with last time.
     pub compared: u64,
+    /// Names of those that have an earlier result and could not be compared with it.
+    #[serde(default)]
+    pub not_compared: Vec<String>,
     /// Robots with an alarm, (1), most certain first.
     pub alarms: Vec<Alarm>,
     /// Joints of series in which any robot changed, most certain first.
@@ -80,6 +83,8 @@ impl Statistics {
 /// What is kept of each robot while the others are read.
 #[derive(Debug, Default)]
 pub(crate) struct Tally {
+    /// Those that could not be compared.
+    not_compared: Vec<String>,
     /// Of each robot that was compared, the probability of its change without one.
     robots: Vec<f64>,
     /// Those that are alarms: place in the list, name, series, joint that changed most.
@@ -92,6 +97,8 @@ impl Tally {
     /// Adds a robot.
     pub fn add(&mut self, robot: &Robot) {
         let Some(drift) = &robot.drift else {
+            let name = robot.not_compared.as_ref().map(|_| robot.name.clone());
+            self.not_compared.extend(name);
             return;
         };
         if drift.p_value < FALSE_ALARMS {
@@ -149,6 +156,7 @@ impl Tally {
         Statistics {
             false_alarms: FALSE_ALARMS,
             compared,
+            not_compared: self.not_compared,
             alarms,
             series,
         }

@@ -22,6 +22,20 @@ pub fn text(summary: &Summary) -> String {
     }
     let drift = &summary.drift;
     let familywise = drift.alarms.iter().filter(|a| a.familywise).count();
+    let unknown = drift.not_compared.len();
+    if unknown > 0 {
+        let names = drift.not_compared.iter().take(NAMED);
+        let names: Vec<String> = names.map(|name| printable_line(name).to_string()).collect();
+        let more = match unknown.saturating_sub(NAMED) {
+            0 => String::new(),
+            more => format!(" and {more} more"),
+        };
+        let _ = writeln!(
+            out,
+            "{unknown} could not be compared with the last calibration (why: `not_compared` in fleet.csv): {}{more}",
+            names.join(", "),
+        );
+    }
     if drift.compared == 0 {
         out.push_str("none compared with an earlier calibration: nothing is known of changes\n");
         return out;

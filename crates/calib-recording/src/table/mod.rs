@@ -10,5 +10,5 @@ pub(crate) use header::{Known, is_canonical, length_unit};
 pub use read::WRITTEN_LIVE;
 pub(crate) use read::read_table;
 pub(crate) use rows::UNIT_TOLERANCE;
-pub use write::{NotWritten, WriteOptions, write_poses, write_recording};
+pub use write::{NotWritten, WriteOptions, joint_column, write_poses, write_recording};
 pub use write_mapped::write_mapped;

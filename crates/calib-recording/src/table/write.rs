@@ -230,6 +230,16 @@ fn header(
     (header, count)
 }
 
+/// The column of a joint with the unit at the end of its name, so that it reads as the joint's.
+#[must_use]
+pub fn joint_column(joint: &str, unit: &str) -> String {
+    let name = format!("{joint}_{unit}");
+    match reads_as_joint(&name, joint) {
+        true => name,
+        false => format!("{JOINT}{name}"),
+    }
+}
+
 /// States which columns are joints, where their names alone say something else.
 pub(super) fn state_joints(poses: &Poses, columns: &mut [OutColumn<'_>]) {
     for column in columns {
