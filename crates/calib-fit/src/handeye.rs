@@ -4,7 +4,7 @@ use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write as _;
 
 use calib_estimator::{Input, Kind, Options, Verdict};
-use calib_handeye::{Correction, HandEye};
+use calib_handeye::{Correction, HandEye, explained_as_written};
 use calib_recording::{BodyColumns, ColumnMap, Problem, ReadOptions};
 use calib_urdf::rpy::{rotation_from_rpy, rpy_from_rotation};
 use nalgebra::{Isometry3, Translation3, Vector3};
@@ -49,9 +49,10 @@ pub fn handeye(request: &HandEyeRequest) -> Result<Answer, FitError> {
         robot,
         measured,
     } = pose_pairs(table, &request.robot, &request.measured)?;
+    let written = measured;
     let measured: Vec<Isometry3<f64>> = match request.inverted {
-        true => measured.iter().map(Isometry3::inverse).collect(),
-        false => measured,
+        true => written.iter().map(Isometry3::inverse).collect(),
+        false => written.clone(),
     };
     let input = Input::PosePairs {
         robot: &robot,
@@ -77,8 +78,11 @@ pub fn handeye(request: &HandEyeRequest) -> Result<Answer, FitError> {
         wish,
         |_| "handeye",
         |id, e| {
-            let rejected: Vec<u64> = e.rejected.iter().map(|&k| rows[k]).collect();
-            handeye_answer(request, id, e, &rejected)
+            let e = &match request.inverted {
+                true => explained_as_written(e, &robot, &written),
+                false => e.clone(),
+            };
+            handeye_answer(request, id, e, &rows)
         },
     )
 }
@@ -144,7 +148,9 @@ fn pose_pairs(table: &Measured, robot: &str, measured: &str) -> Result<PosePairs
     Ok(pairs)
 }
 
-fn handeye_answer(request: &HandEyeRequest, id: &str, e: &HandEye, rejected: &[u64]) -> Answer {
+/// `rows`: of the poses, in the file.
+fn handeye_answer(request: &HandEyeRequest, id: &str, e: &HandEye, rows: &[u64]) -> Answer {
+    let rejected: Vec<u64> = e.rejected.iter().map(|&k| rows[k]).collect();
     let observable = e.verdict == Verdict::Ok;
     let camera = (request.optical && observable).then(|| e.x * link_from_optical().inverse());
     let value = json!({
@@ -173,7 +179,7 @@ fn handeye_answer(request: &HandEyeRequest, id: &str, e: &HandEye, rejected: &[u
         request.robot, request.measured, e.used
     );
     text += &doubt(e.reason.as_deref());
-    if let Some(remedy) = remedy(request, e) {
+    if let Some(remedy) = remedy(request, e, rows) {
         let _ = writeln!(text, "  {remedy}");
     }
     for (name, pose, at) in [
@@ -224,17 +230,37 @@ fn handeye_answer(request: &HandEyeRequest, id: &str, e: &HandEye, rejected: &[u
     answer(text, &value, observable)
 }
 
-/// What to do where the poses of one side are inverted.
-fn remedy(request: &HandEyeRequest, e: &HandEye) -> Option<&'static str> {
+/// What to do about a mistake of the tables.
+fn remedy(request: &HandEyeRequest, e: &HandEye, rows: &[u64]) -> Option<String> {
     let candidates = &e.explanation.as_ref()?.candidates;
-    let inverted = |c: &Correction| matches!(c, Correction::InvertedPoses(_));
-    let found = candidates.iter().flatten().any(inverted);
-    found.then_some(match request.inverted {
-        true => "Run it again without --inverted, or give the flange in the robot's base.",
-        false => {
-            "If the measured poses are those of a board or tag in the camera, run it again with --inverted; else give the flange in the robot's base."
-        }
-    })
+    let of = |c: &Correction| -> Option<String> {
+        let row = |pose: &usize| rows.get(*pose).copied().unwrap_or_default();
+        Some(match c {
+            Correction::InvertedPoses(_) if request.inverted => {
+                "Run it again without --inverted, or give the flange in the robot's base."
+                    .to_owned()
+            }
+            Correction::InvertedPoses(_) => {
+                "If the measured poses are those of a board or tag in the camera, run it again with --inverted; else give the flange in the robot's base."
+                    .to_owned()
+            }
+            Correction::Scaled(_) => {
+                "Check the size of the board's squares or of the tag as it was stated, and the tracker's or camera's calibration; then multiply the positions \
+                 or measure them again."
+                    .to_owned()
+            }
+            Correction::BodyMoved(pose) => format!(
+                "It was elsewhere on the flange from row {} on: use the rows before, or those from it on.",
+                row(pose)
+            ),
+            Correction::TrackerMoved(pose) => format!(
+                "One of them was elsewhere from row {} on: use the rows before, or those from it on.",
+                row(pose)
+            ),
+            _ => return None,
+        })
+    };
+    candidates.iter().flatten().find_map(of)
 }
 
 /// How the optical frame of a camera (z along the view, x to the right, y down) stands in the camera's frame of a URDF (x along the view,

@@ -17,6 +17,7 @@ use crate::{
     problem::{HandEyeWeights, Weights},
     residuals::spread,
     structure,
+    unmodelled::unmodelled,
 };
 
 /// What `handeye` is and needs.
@@ -102,9 +103,19 @@ fn fitted(
     };
     let (a, b) = (chosen(robot), chosen(measured));
     let found = solve(&a, &b, w)?;
+    let judged = judged(estimator, [&a, &b], &found, w, options);
+    let beyond = unmodelled(
+        [robot, measured],
+        &keep,
+        &judged,
+        options.significance,
+        |left| plausible(left, [spread(robot), spread(measured)]),
+    );
     Ok(HandEye {
         rejected: (0..robot.len()).filter(|i| !keep.contains(i)).collect(),
-        ..judged(estimator, [&a, &b], &found, w, options)
+        covariance: judged.covariance.map(|c| c + beyond.covariance),
+        explanation: beyond.explanation,
+        ..judged
     })
 }
 

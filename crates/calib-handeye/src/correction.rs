@@ -36,6 +36,12 @@ pub enum Correction {
     Thousandth(Side),
     /// The measured pose of a row belongs to the robot's pose so many rows before.
     Rows(i8),
+    /// The measured lengths must be multiplied by this to be those of the robot.
+    Scaled(f64),
+    /// From this pose on, counted from 0, the body was elsewhere on the flange.
+    BodyMoved(usize),
+    /// From this pose on, counted from 0, the tracker (or board) or the robot's base was elsewhere.
+    TrackerMoved(usize),
 }
 
 /// The corrections that explain the residuals.
@@ -82,6 +88,21 @@ impl std::fmt::Display for Correction {
                 let word = if *by > 0 { "late" } else { "early" };
                 write!(f, "the measured poses are {} row {word}", by.abs())
             }
+            Self::Scaled(factor) => write!(
+                f,
+                "the measured lengths are {:.4} times those of the robot",
+                1.0 / factor
+            ),
+            Self::BodyMoved(pose) => write!(
+                f,
+                "what is measured on the flange was moved before pose {} of the table",
+                pose + 1
+            ),
+            Self::TrackerMoved(pose) => write!(
+                f,
+                "the tracker, the board or the robot's base was moved before pose {} of the table",
+                pose + 1
+            ),
         }
     }
 }

@@ -142,7 +142,7 @@ pub(crate) fn verdict(e: &mut HandEye, size: [f64; 2], rows: usize, options: &Op
     }
 }
 
-fn structural(e: &HandEye) -> Option<String> {
+pub(crate) fn structural(e: &HandEye) -> Option<String> {
     let found = e.explanation.as_ref()?;
     Some(format!("the tables fit after a correction: {found}"))
 }

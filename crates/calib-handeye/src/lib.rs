@@ -21,8 +21,9 @@
 //! The estimators of the table ([`estimators`]) also judge: noise and covariance from the residuals, rows with gross errors, and
 //! structural mistakes of the tables (order of quaternions, inverted poses, units, shifted rows), each verified by applying its correction.
 //!
-//! What this does not protect against: a body that slips on the flange shows in the residuals only, and swapped tables not
-//! even there: X and Z come out as their inverses.
+//! Lengths of two scales, and a body or tracker that was moved between two rows, are fitted beside X and Z and named.
+//!
+//! What this does not protect against: swapped tables, which leave no residual. X and Z come out as their inverses.
 //!
 //! ```
 //! use calib_handeye::{HandEyeWeights, solve_ax_zb};
@@ -58,6 +59,7 @@ mod relative;
 mod residuals;
 mod start;
 mod structure;
+mod unmodelled;
 
 pub use correction::{Correction, Explanation, Side};
 pub use input::HandEyeError;
@@ -69,6 +71,7 @@ pub use problem::HandEyeWeights;
 pub use registry::{estimator, estimators};
 pub use relative::{relative_motions, solve_ax_xb};
 pub use residuals::Residuals;
+pub use structure::explained_as_written;
 
 /// The README's example is a test.
 #[cfg(doctest)]

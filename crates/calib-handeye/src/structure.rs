@@ -12,13 +12,16 @@
 //! thousand on the other. Two swapped sides, and inverted poses on both, fit as well as none: X and Z come out as each other's inverse, or
 //! in each other's place, and no residual shows it.
 
+use calib_estimator::Verdict;
 use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 use crate::{
     correction::{Correction, Explanation, Side},
+    judge,
     minimum::{Minimum, minimized},
-    problem::Weights,
-    residuals::{Residuals, squares},
+    outcome::HandEye,
+    problem::{HandEyeWeights, Weights},
+    residuals::{Residuals, spread, squares},
 };
 
 /// Ratio of scores from which a correction is named: clean recordings do not reach 1.33.
@@ -58,6 +61,17 @@ struct Tables {
     measured: Vec<Isometry3<f64>>,
     /// Factor on the measured positions.
     scale: f64,
+    /// The measured poses are used inverted: mistakes of the file are corrected before.
+    inverted: bool,
+}
+
+impl Tables {
+    fn measured_as_used(&self) -> Vec<Isometry3<f64>> {
+        match self.inverted {
+            true => self.measured.iter().map(Isometry3::inverse).collect(),
+            false => self.measured.clone(),
+        }
+    }
 }
 
 impl Correction {
@@ -86,6 +100,8 @@ impl Correction {
             Self::InvertedPoses(side) => on(&mut out, side, &Isometry3::inverse),
             Self::Millimeters(side) => scaled(&mut out, side, 1e-3, on),
             Self::Thousandth(side) => scaled(&mut out, side, 1e3, on),
+            // Fitted, not tried.
+            Self::Scaled(_) | Self::BodyMoved(_) | Self::TrackerMoved(_) => {}
             Self::Rows(by) => {
                 let n = out.robot.len();
                 let by_rows = usize::from(by.unsigned_abs()).min(n);
@@ -135,7 +151,7 @@ fn scored(corrections: Vec<Correction>, tables: Tables, w: Weights) -> Option<Sc
     let some = |poses: &[Isometry3<f64>]| -> Vec<Isometry3<f64>> {
         poses.iter().step_by(stride).copied().collect()
     };
-    let (a, b) = (some(&tables.robot), some(&tables.measured));
+    let (a, b) = (some(&tables.robot), some(&tables.measured_as_used()));
     if a.len() < 3 || crate::input::check_axes(&a).is_err() {
         return None;
     }
@@ -194,9 +210,47 @@ pub(crate) fn explanation(
         robot: robot.to_vec(),
         measured: measured.to_vec(),
         scale: 1.0,
+        inverted: false,
     };
+    of(given, w, plausible)
+}
+
+/// An answer in doubt, explained by the table of measured poses as it was written, if that is used inverted (where a camera states a board's
+/// poses): an order of quaternions is that of the file.
+#[must_use]
+pub fn explained_as_written(
+    found: &HandEye,
+    robot: &[Isometry3<f64>],
+    written: &[Isometry3<f64>],
+) -> HandEye {
+    let mut out = found.clone();
+    if out.verdict == Verdict::Ok || out.explanation.is_some() {
+        return out;
+    }
+    let given = Tables {
+        robot: robot.to_vec(),
+        measured: written.to_vec(),
+        scale: 1.0,
+        inverted: true,
+    };
+    let w = Weights::of(HandEyeWeights::default());
+    out.explanation = of(given, w, |left, a, b| {
+        judge::plausible(left, [spread(a), spread(b)])
+    });
+    if let Some(reason) = judge::structural(&out) {
+        out.reason = Some(reason);
+    }
+    out
+}
+
+fn of(
+    given: Tables,
+    w: Weights,
+    plausible: impl Fn(&Residuals, &[Isometry3<f64>], &[Isometry3<f64>]) -> bool,
+) -> Option<Explanation> {
     let none = scored(Vec::new(), given, w)?;
-    let passes = |s: &Scored| plausible(&s.residuals, &s.tables.robot, &s.tables.measured);
+    let passes =
+        |s: &Scored| plausible(&s.residuals, &s.tables.robot, &s.tables.measured_as_used());
     let added = |to: &Scored| -> Vec<Scored> {
         let mut found: Vec<Scored> = singles()
             .into_iter()

@@ -306,3 +306,55 @@ fn lengths_of_no_arm_are_not_meters() {
     assert_eq!(found.verdict, Verdict::Weak);
     assert!(found.reason.is_some_and(|r| r.contains("millimeters")));
 }
+
+/// A factor on the measured lengths.
+fn lengths(case: &mut Case, factor: f64) {
+    for p in &mut case.b {
+        p.translation.vector *= factor;
+    }
+}
+
+/// From `row` on the body is elsewhere on the flange, or the tracker elsewhere.
+fn moved(case: &mut Case, row: usize, body: bool) {
+    let by = Isometry3::new(Vector3::new(0.006, -0.004, 0.003), Vector3::zeros());
+    for p in &mut case.b[row..] {
+        *p = if body { *p * by } else { by * *p };
+    }
+}
+
+#[test]
+fn a_scale_and_a_move_are_no_noise() {
+    for n in [10, 24, 80] {
+        for seed in 0..3 {
+            let explained = |change: &dyn Fn(&mut Case)| -> Correction {
+                let mut case = case(100 * n as u64 + seed, n, [5e-4, 2e-3]);
+                change(&mut case);
+                let found = fit(&case, &Options::default());
+                assert_eq!(found.verdict, Verdict::Weak, "{n} {seed}: {found:?}");
+                let candidates = found.explanation.expect("an explanation").candidates;
+                assert_eq!(candidates.len(), 1);
+                assert_eq!(candidates[0].len(), 1);
+                candidates[0][0]
+            };
+            for factor in [0.97, 1.02] {
+                match explained(&|case| lengths(case, factor)) {
+                    Correction::Scaled(by) => assert!((by * factor - 1.0).abs() < 3e-3, "{by}"),
+                    other => panic!("{n} {seed}: {other:?}"),
+                }
+            }
+            for row in [n / 2, n - n / 5] {
+                if n - row < 4 {
+                    continue;
+                }
+                let at = |c: Correction| match c {
+                    Correction::BodyMoved(at) => (at, true),
+                    Correction::TrackerMoved(at) => (at, false),
+                    other => panic!("{n} {seed}: {other:?}"),
+                };
+                for body in [true, false] {
+                    assert_eq!(at(explained(&|case| moved(case, row, body))), (row, body));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,366 @@
+//! What changes from pose to pose and passes for noise: lengths of two scales, and a body, tracker or base that was moved between two rows.
+//!
+//! ```text
+//! Λ = (f_t − p/2) ln(Σe²/Σe'²) + (f_r − p/2) ln(Σθ²/Σθ'²)  ~  χ²(p),   f = 3n − 6               (8)
+//! ```
+//!
+//! Each is fitted beside X and Z: one factor on the measured positions, or a second X or Z from some row on, for every row. The best is
+//! judged by (8), times the number that was tried. One that lowers a residual by [`SHOWN`] is an explanation; a smaller one
+//! adds what it does to X and Z to their covariance.
+
+use calib_estimator::chance::chi2_tail;
+use nalgebra::{Isometry3, SMatrix, SVector, Translation3, Vector6};
+
+use crate::{
+    correction::{Correction, Explanation},
+    gross,
+    minimum::{Minimum, minimized},
+    outcome::{Covariance, HandEye},
+    problem::{Weights, linearize, moved},
+    residuals::{Residuals, squares},
+};
+
+/// Ratio of residuals from which an effect is an explanation, and not only a part of the uncertainty.
+const SHOWN: f64 = 1.1;
+/// Poses on either side of a move: three determine a transform, one more judges it.
+const SIDE: usize = 4;
+/// Fewest poses that are judged.
+const FEWEST: usize = 2 * SIDE;
+/// Poses that were lost as gross errors and that a move must bring back: three times six numbers are explained by six.
+const BROUGHT_BACK: usize = 3;
+/// Rounds of Gauss–Newton: the start is a linear step away.
+const ROUNDS: usize = 20;
+/// Residuals, m and rad, below which data count as exact.
+const EXACT: f64 = 1e-9;
+
+/// Which of the two transforms is another one from some row on.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Part {
+    X,
+    Z,
+}
+
+/// An effect with the fit beside it.
+struct Effect {
+    correction: Correction,
+    /// Measured poses without it.
+    measured: Vec<Isometry3<f64>>,
+    /// X and Z beside it: those of the rows before a move, and those after it.
+    fits: Vec<Minimum>,
+    parameters: f64,
+}
+
+/// What the residuals say beyond noise.
+pub(crate) struct Unmodelled {
+    /// Large enough to be named.
+    pub explanation: Option<Explanation>,
+    /// What a small effect adds to the covariance.
+    pub covariance: Covariance,
+}
+
+/// Judges the rows that were `kept` of both tables; `judged` is their fit. What is left must be `plausible`.
+pub(crate) fn unmodelled(
+    tables: [&[Isometry3<f64>]; 2],
+    kept: &[usize],
+    judged: &HandEye,
+    significance: f64,
+    plausible: impl Fn(&Residuals) -> bool,
+) -> Unmodelled {
+    let mut out = Unmodelled {
+        explanation: None,
+        covariance: Covariance::zeros(),
+    };
+    let [sigma_t, sigma_r] =
+        [judged.rms_translation, judged.rms_rotation].map(|rms| rms / 3f64.sqrt());
+    if kept.len() < FEWEST || sigma_t < EXACT || sigma_r < EXACT {
+        return out;
+    }
+    let w = Weights {
+        rotation: 0.5 / (sigma_r * sigma_r),
+        translation: 1.0 / (sigma_t * sigma_t),
+    };
+    if tables[0].len() >= kept.len() + BROUGHT_BACK {
+        out.explanation = brought_back(tables, kept, w).filter(|e| plausible(&e.after));
+        if out.explanation.is_some() {
+            return out;
+        }
+    }
+    let [a, b] = tables.map(|poses| chosen(poses, kept));
+    let none = minimized(&a, &b, w);
+    let before = sums(&a, &b, &none);
+    let splits = moves(&a, &b, &none, w);
+    let tried = 1.0 + splits.tried as f64;
+    let effects = std::iter::once(scale(&a, &b, &none, w)).chain(
+        splits
+            .best
+            .map(|(part, row)| moved_from(&a, &b, &none, w, part, row)),
+    );
+    let chance = |e: &Effect| {
+        let freedom = 3.0 * a.len() as f64 - 6.0 - 0.5 * e.parameters;
+        let after = sums(&a, &e.measured, &e.fits[0]);
+        let ratio = (before[0] / after[0]).ln() + (before[1] / after[1]).ln();
+        tried * chi2_tail(freedom * ratio, e.parameters)
+    };
+    let Some((best, p)) = effects
+        .map(|e| (chance(&e), e))
+        .map(|(p, e)| (e, p))
+        .min_by(|x, y| x.1.total_cmp(&y.1))
+    else {
+        return out;
+    };
+    if p >= significance {
+        return out;
+    }
+    let after = sums(&a, &best.measured, &best.fits[0]);
+    let ratio = (0..2)
+        .map(|k| (before[k] / after[k]).sqrt())
+        .fold(0.0, f64::max);
+    if ratio < SHOWN {
+        for fit in &best.fits {
+            let by = difference(&none, fit);
+            out.covariance += by * by.transpose();
+        }
+        return out;
+    }
+    let correction = match best.correction {
+        Correction::BodyMoved(row) => Correction::BodyMoved(kept[row]),
+        Correction::TrackerMoved(row) => Correction::TrackerMoved(kept[row]),
+        other => other,
+    };
+    out.explanation =
+        Some(explained(correction, [before, after], [a.len(); 2])).filter(|e| plausible(&e.after));
+    out
+}
+
+fn explained(correction: Correction, sums: [[f64; 2]; 2], rows: [usize; 2]) -> Explanation {
+    let [before, after] = [0, 1].map(|k| Residuals {
+        rms_translation: (sums[k][0] / rows[k] as f64).sqrt(),
+        rms_rotation: (sums[k][1] / rows[k] as f64).sqrt(),
+    });
+    Explanation {
+        candidates: vec![vec![correction]],
+        before,
+        after,
+    }
+}
+
+/// A move that makes good poses of those that were taken for gross errors.
+fn brought_back([a, b]: [&[Isometry3<f64>]; 2], kept: &[usize], w: Weights) -> Option<Explanation> {
+    let of_kept = minimized(&chosen(a, kept), &chosen(b, kept), w);
+    let (part, row) = moves(a, b, &of_kept, w).best?;
+    let effect = moved_from(a, b, &of_kept, w, part, row);
+    let keeps = gross::kept(a, &effect.measured, w);
+    if keeps.len() < kept.len() + BROUGHT_BACK {
+        return None;
+    }
+    let (all, good) = (
+        sums(a, b, &of_kept),
+        sums(
+            &chosen(a, &keeps),
+            &chosen(&effect.measured, &keeps),
+            &effect.fits[0],
+        ),
+    );
+    Some(explained(
+        effect.correction,
+        [all, good],
+        [a.len(), keeps.len()],
+    ))
+}
+
+fn chosen(poses: &[Isometry3<f64>], rows: &[usize]) -> Vec<Isometry3<f64>> {
+    rows.iter().map(|&i| poses[i]).collect()
+}
+
+/// Sums of the squares of positions and of angles.
+fn sums(a: &[Isometry3<f64>], b: &[Isometry3<f64>], fit: &Minimum) -> [f64; 2] {
+    let rows = a.iter().zip(b).map(|(a, b)| squares(a, b, &fit.x, &fit.z));
+    rows.fold([0.0; 2], |sum, s| [sum[0] + s[0], sum[1] + s[1]])
+}
+
+/// Right perturbation `[ω_x; v_x; ω_z; v_z]` that leads from one fit to another.
+fn difference(from: &Minimum, to: &Minimum) -> SVector<f64, 12> {
+    let mut out = SVector::<f64, 12>::zeros();
+    for (k, (from, to)) in [(&from.x, &to.x), (&from.z, &to.z)].into_iter().enumerate() {
+        let d = from.inverse() * to;
+        out.fixed_rows_mut::<3>(6 * k)
+            .copy_from(&d.rotation.scaled_axis());
+        out.fixed_rows_mut::<3>(6 * k + 3)
+            .copy_from(&d.translation.vector);
+    }
+    out
+}
+
+/// A factor on the measured positions beside X and Z.
+fn scale(a: &[Isometry3<f64>], b: &[Isometry3<f64>], none: &Minimum, w: Weights) -> Effect {
+    let by = |factor: f64| -> Vec<Isometry3<f64>> {
+        let scaled = |p: &Isometry3<f64>| {
+            Isometry3::from_parts(
+                Translation3::from(p.translation.vector * factor),
+                p.rotation,
+            )
+        };
+        b.iter().map(scaled).collect()
+    };
+    let (mut factor, mut fit) = (1.0, *none);
+    for _ in 0..ROUNDS {
+        let measured = by(factor);
+        // One column more: d e / d ln k = −R_Z k t_B.
+        let (h, g, _) = linearize(a, &measured, &fit.x, &fit.z, w);
+        let mut full = SMatrix::<f64, 13, 13>::zeros();
+        let mut right = SVector::<f64, 13>::zeros();
+        full.fixed_view_mut::<12, 12>(0, 0).copy_from(&h);
+        right.fixed_rows_mut::<12>(0).copy_from(&g);
+        let none = Weights { rotation: 0.0, ..w };
+        for (a, b) in a.iter().zip(&measured) {
+            // Twice the gradient of the positions' cost along the column, by the system of a row: d e/d v_z = −R_Z.
+            let (row, gradient, _) = linearize(
+                std::slice::from_ref(a),
+                std::slice::from_ref(b),
+                &fit.x,
+                &fit.z,
+                none,
+            );
+            let t = b.translation.vector;
+            let column = row.fixed_view::<12, 3>(0, 9) * t;
+            for k in 0..12 {
+                full[(k, 12)] += column[k];
+                full[(12, k)] += column[k];
+            }
+            full[(12, 12)] += w.translation * t.norm_squared();
+            right[12] += gradient.fixed_rows::<3>(9).dot(&t);
+        }
+        let Some(step) = nalgebra::Cholesky::new(full).map(|c| -c.solve(&right)) else {
+            break;
+        };
+        factor *= 1.0 + step[12].clamp(-0.5, 0.5);
+        fit.x = moved(&fit.x, &step.fixed_rows::<6>(0).into_owned());
+        fit.z = moved(&fit.z, &step.fixed_rows::<6>(6).into_owned());
+        if step[12].abs() < 1e-12 {
+            break;
+        }
+    }
+    Effect {
+        correction: Correction::Scaled(factor),
+        measured: by(factor),
+        fits: vec![fit],
+        parameters: 1.0,
+    }
+}
+
+/// The best row of a move, and how many were tried.
+struct Moves {
+    best: Option<(Part, usize)>,
+    tried: usize,
+}
+
+/// The move that lowers the linear cost most. The columns of a second X (or Z) are those of the first, in the rows from it on.
+fn moves(a: &[Isometry3<f64>], b: &[Isometry3<f64>], fit: &Minimum, w: Weights) -> Moves {
+    let n = a.len();
+    let (all, gradient, _) = linearize(a, b, &fit.x, &fit.z, w);
+    let (mut h, mut g) = (SMatrix::<f64, 12, 12>::zeros(), SVector::<f64, 12>::zeros());
+    let mut best: Option<(f64, Part, usize)> = None;
+    let mut tried = 0;
+    for row in (SIDE..n).rev() {
+        let (of_row, of_gradient, _) = linearize(&a[row..=row], &b[row..=row], &fit.x, &fit.z, w);
+        h += of_row;
+        g += of_gradient;
+        if n - row < SIDE {
+            continue;
+        }
+        for (part, at) in [(Part::X, 0), (Part::Z, 6)] {
+            let mut full = SMatrix::<f64, 18, 18>::zeros();
+            let mut right = SVector::<f64, 18>::zeros();
+            full.fixed_view_mut::<12, 12>(0, 0).copy_from(&all);
+            full.fixed_view_mut::<12, 6>(0, 12)
+                .copy_from(&h.fixed_columns::<6>(at));
+            full.fixed_view_mut::<6, 12>(12, 0)
+                .copy_from(&h.fixed_rows::<6>(at));
+            full.fixed_view_mut::<6, 6>(12, 12)
+                .copy_from(&h.fixed_view::<6, 6>(at, at));
+            right.fixed_rows_mut::<12>(0).copy_from(&gradient);
+            right
+                .fixed_rows_mut::<6>(12)
+                .copy_from(&g.fixed_rows::<6>(at));
+            let Some(decrease) = nalgebra::Cholesky::new(full).map(|c| right.dot(&c.solve(&right)))
+            else {
+                continue;
+            };
+            tried += 1;
+            if best.is_none_or(|(most, ..)| decrease > most) {
+                best = Some((decrease, part, row));
+            }
+        }
+    }
+    Moves {
+        best: best.map(|(_, part, row)| (part, row)),
+        tried,
+    }
+}
+
+/// X (or Z) of the rows before `row` and of those from it on, beside one Z (or X).
+fn moved_from(
+    a: &[Isometry3<f64>],
+    b: &[Isometry3<f64>],
+    start: &Minimum,
+    w: Weights,
+    part: Part,
+    row: usize,
+) -> Effect {
+    let mut fits = [*start; 2];
+    let at = |part: Part| match part {
+        Part::X => 0,
+        Part::Z => 6,
+    };
+    let (own, common) = (at(part), 6 - at(part));
+    for _ in 0..ROUNDS {
+        let mut full = SMatrix::<f64, 18, 18>::zeros();
+        let mut right = SVector::<f64, 18>::zeros();
+        for (k, rows) in [0..row, row..a.len()].into_iter().enumerate() {
+            let (h, g, _) = linearize(&a[rows.clone()], &b[rows], &fits[k].x, &fits[k].z, w);
+            // [common; own of the rows before; own of those after]
+            for (i, from) in [(0, common), (6 + 6 * k, own)] {
+                for (j, to) in [(0, common), (6 + 6 * k, own)] {
+                    let mut block = full.fixed_view_mut::<6, 6>(i, j);
+                    block += h.fixed_view::<6, 6>(from, to);
+                }
+                let mut block = right.fixed_rows_mut::<6>(i);
+                block += g.fixed_rows::<6>(from);
+            }
+        }
+        let Some(step) = nalgebra::Cholesky::new(full).map(|c| -c.solve(&right)) else {
+            break;
+        };
+        let shared: Vector6<f64> = step.fixed_rows::<6>(0).into_owned();
+        for (k, fit) in fits.iter_mut().enumerate() {
+            let own: Vector6<f64> = step.fixed_rows::<6>(6 + 6 * k).into_owned();
+            let (x, z) = match part {
+                Part::X => (own, shared),
+                Part::Z => (shared, own),
+            };
+            (fit.x, fit.z) = (moved(&fit.x, &x), moved(&fit.z, &z));
+        }
+        if step.amax() < 1e-12 {
+            break;
+        }
+    }
+    // A X₂ = Z B → A X₁ = Z (B X₂⁻¹ X₁);   A X = Z₂ B → A X = Z₁ (Z₁⁻¹ Z₂ B)
+    let back = match part {
+        Part::X => fits[1].x.inverse() * fits[0].x,
+        Part::Z => fits[0].z.inverse() * fits[1].z,
+    };
+    let measured = b.iter().enumerate().map(|(i, b)| match (i < row, part) {
+        (true, _) => *b,
+        (false, Part::X) => b * back,
+        (false, Part::Z) => back * b,
+    });
+    Effect {
+        correction: match part {
+            Part::X => Correction::BodyMoved(row),
+            Part::Z => Correction::TrackerMoved(row),
+        },
+        measured: measured.collect(),
+        fits: fits.to_vec(),
+        parameters: 6.0,
+    }
+}
