@@ -234,11 +234,48 @@ fn joints_that_are_all_late_are_not_called_late_one_by_one() {
     if !skipped_tests::thorough() {
         return;
     }
-    for late in [0.0, 0.03] {
+    // A tenth of a second and more: the motion of a whole row.
+    for late in [0.0, 0.03, 0.12, 0.3] {
         let (ran, report) = run(&continuous(|_| late, None));
         assert_eq!(ran.code, 0, "{}", ran.stderr);
         assert!(told(&report).is_none(), "{:#}", report["findings"]);
         nothing_else_is_blamed(&report);
+    }
+}
+
+/// The tracker's cells of every `times`-th row, also in the rows after it; the joints' are their own.
+fn repeated(table: &str, times: usize) -> String {
+    let (comments, lines): (Vec<&str>, Vec<&str>) =
+        table.lines().partition(|line| line.starts_with('#'));
+    let of_tracker: Vec<bool> = lines[0].split(',').map(|c| c.ends_with("_m")).collect();
+    let cells = |k: usize| lines[1 + k].split(',').collect::<Vec<&str>>();
+    let rows = (0..lines.len() - 1).map(|k| {
+        let (own, held) = (cells(k), cells(k / times * times));
+        let pairs = own.into_iter().zip(held).zip(&of_tracker);
+        let row = pairs.map(|((own, held), tracked)| if *tracked { held } else { own });
+        row.collect::<Vec<&str>>().join(",")
+    });
+    let all = comments.into_iter().chain([lines[0]]).map(str::to_owned);
+    all.chain(rows).collect::<Vec<String>>().join("\n") + "\n"
+}
+
+/// A log of the robot's rate that writes the tracker's last frame again: its rows are no measurements.
+#[test]
+fn frames_that_a_faster_table_repeats_count_once() {
+    for times in [2, 3] {
+        let dir = continuous(|_| 0.0, None);
+        let [poses, checks] = [POSES, CHECKS].map(|file| repeated(&dir.read(file), times));
+        let rows = poses.lines().filter(|l| !l.starts_with('#')).count() - 1;
+        let (ran, report) = run(&dir.file(POSES, poses).file(CHECKS, checks));
+        assert_eq!(ran.code, 0, "{times}: {}", ran.stdout);
+        let named = findings(&report, "frames-repeated");
+        assert_eq!(named.len(), 2, "{times}: {:#}", report["findings"]);
+        let of_poses = named
+            .iter()
+            .find(|f| f["about"]["recordings"][0] == "arm_poses");
+        let facts = &of_poses.expect("named")["facts"];
+        assert_eq!(facts["repeated"], rows - rows.div_ceil(times));
+        assert_eq!(facts["longest"], times);
     }
 }
 

@@ -16,9 +16,10 @@ pub struct HoldSettings {
     pub window: f64,
     /// Range of a joint within the window, rad or m. Default 1e-3: 5 mrad/s.
     pub joint_range: f64,
-    /// Range of a marker or body within the window, m. Default 1e-3: ten σ of a usual tracker.
+    /// Range of a marker or body within the window, m. Default 1e-3: ten σ of a usual tracker. Where more noise is seen while the joints
+    /// stand still, nine times that.
     pub point_range: f64,
-    /// Range of a body's angle within the window, rad. Default 0.01.
+    /// Range of a body's angle within the window, rad. Default 0.01, or as of a point.
     pub turn_range: f64,
     /// Part of each hold that is dropped at its start. Default 0.2.
     pub drop_start: f64,
@@ -68,20 +69,17 @@ pub struct StaticPoses {
 /// says so itself: in a column `hold`, as recorded live, each text is a hold of its own.
 pub fn holds(poses: &Poses, settings: &HoldSettings) -> Vec<Hold> {
     let Some(t) = &poses.t else { return Vec::new() };
-    let channels = channels(poses, settings);
-    let mut quiet = vec![false; t.len()];
-    let (mut from, mut to) = (0, 0);
-    for i in 0..t.len() {
-        while t[i] - t[from] > settings.window / 2.0 {
-            from += 1;
-        }
-        while to + 1 < t.len() && t[to + 1] - t[i] <= settings.window / 2.0 {
-            to += 1;
-        }
-        quiet[i] = channels
-            .iter()
-            .all(|(values, limit)| range(&values[from..=to]).is_none_or(|range| range <= *limit));
+    let mut joints = Vec::new();
+    for q in poses.joints.values() {
+        joints.push((q.clone(), settings.joint_range));
     }
+    let resting = quiet(t, &joints, settings.window);
+    let mut channels = tracked(poses, settings);
+    for (values, limit) in &mut channels {
+        *limit = limit.max(SPREAD * noise(values, &resting));
+    }
+    channels.extend(joints);
+    let quiet = quiet(t, &channels, settings.window);
     let names = poses.labels.get("hold");
     let apart = |end: usize| {
         t[end] - t[end - 1] > settings.window
@@ -106,14 +104,56 @@ pub fn holds(poses: &Poses, settings: &HoldSettings) -> Vec<Hold> {
     found
 }
 
-/// Every coordinate that must stand still, with its limit. A body's turn enters as rotation-vector components against
+/// Values that must stand still, with the limit of their range.
+type Channel = (Vec<Option<f64>>, f64);
+
+/// The range of noise within a window, in units of its σ: twenty samples exceed it in one window of 10⁸.
+const SPREAD: f64 = 9.0;
+
+/// Fewest second differences that tell a noise.
+const ENOUGH: usize = 20;
+
+/// Rows about which all channels stand still within the window.
+fn quiet(t: &[f64], channels: &[Channel], window: f64) -> Vec<bool> {
+    let mut quiet = vec![false; t.len()];
+    let (mut from, mut to) = (0, 0);
+    for i in 0..t.len() {
+        while t[i] - t[from] > window / 2.0 {
+            from += 1;
+        }
+        while to + 1 < t.len() && t[to + 1] - t[i] <= window / 2.0 {
+            to += 1;
+        }
+        quiet[i] = channels
+            .iter()
+            .all(|(values, limit)| range(&values[from..=to]).is_none_or(|range| range <= *limit));
+    }
+    quiet
+}
+
+/// σ of a channel while the joints rest, from the median of its second differences, which a slow drift does not enter. 0 where too few are known,
+/// or where the joints rest everywhere (none are recorded).
+fn noise(values: &[Option<f64>], resting: &[bool]) -> f64 {
+    /// Median of |z| of a normal variable.
+    const MIDDLE: f64 = 0.674_5;
+    if resting.iter().all(|rest| *rest) {
+        return 0.0;
+    }
+    let at_rest =
+        (1..values.len().max(1) - 1).filter(|&i| resting[i - 1] && resting[i] && resting[i + 1]);
+    let differences =
+        at_rest.filter_map(|i| Some((values[i - 1]? - 2.0 * values[i]? + values[i + 1]?).abs()));
+    let differences: Vec<f64> = differences.collect();
+    if differences.len() < ENOUGH {
+        return 0.0;
+    }
+    crate::statistics::median(differences).unwrap_or(0.0) / (MIDDLE * 6f64.sqrt())
+}
+
+/// Every coordinate of markers and bodies, with its limit. A body's turn enters as rotation-vector components against
 /// its first orientation, which is exact enough within a window.
-fn channels(poses: &Poses, settings: &HoldSettings) -> Vec<(Vec<Option<f64>>, f64)> {
-    let mut channels: Vec<(Vec<Option<f64>>, f64)> = poses
-        .joints
-        .values()
-        .map(|q| (q.clone(), settings.joint_range))
-        .collect();
+fn tracked(poses: &Poses, settings: &HoldSettings) -> Vec<Channel> {
+    let mut channels: Vec<Channel> = Vec::new();
     for track in poses.markers.values() {
         // What stands still may be written as two neighboring multiples of the step.
         let limit = settings.point_range + step_of_points(track);

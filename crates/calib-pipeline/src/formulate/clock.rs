@@ -150,7 +150,13 @@ pub fn clock_estimate(loaded: &Loaded, fit: Option<&MlFit>) -> Option<ClockEstim
     };
     let (map, aligned) = match &alignment.clocks {
         ClockState::Found { map, .. } => (*map, true),
-        ClockState::OneWithLag => (same, false),
+        ClockState::OneWithLag { start } => (
+            ClockMap {
+                offset: *start,
+                ..same
+            },
+            false,
+        ),
         ClockState::One | ClockState::Declared => return None,
     };
     let by_correlation = aligned.then_some(ClockEstimate {

@@ -25,6 +25,7 @@ use crate::error::{DataProblem, PipelineError};
 
 use crate::prepare::aligned::{Aligned, Alignment, ClockState, SAME_TIME};
 use crate::prepare::blanks;
+use crate::prepare::fresh::only_fresh;
 use crate::prepare::inputs::RobotProfile;
 use crate::prepare::row_noise::RowNoise;
 use crate::prepare::settled::settle;
@@ -33,6 +34,9 @@ use crate::prepare::timelines::{estimate, tracker_table, tracker_timeline};
 
 /// Half of the time over which a joint's speed is measured, s: several samples of any controller.
 pub(crate) const HALF_CHORD: f64 = 0.02;
+
+/// Joints at rest stay within this, rad or m.
+const JITTER: f64 = 2e-4;
 
 /// The table of a timed recording, and of the robot's own log where that is another file.
 ///
@@ -48,6 +52,30 @@ pub fn align(
     let file = || robot.folder.join(&spec.file).display().to_string();
     aligned(robot, name, spec, timing, recording)
         .map_err(|problem| PipelineError::data(file(), problem))
+}
+
+/// Offsets, s, that the fit finds from nothing: the motion within them is nearly straight.
+const SMALL_LAG: f64 = 0.03;
+/// Largest offset, s, of joint values that were read late.
+const LARGEST_LAG: f64 = 1.0;
+
+/// By how much the tracker's times are later than those of the joints of the same rows, s, where that is too much for a fit to start from 0. 0 where
+/// the motion does not tell.
+fn large_lag(
+    robot: &RobotProfile,
+    spec: &RecordingSpec,
+    timing: &Timing,
+    (table, joints): (&Poses, &BTreeMap<String, Scalars>),
+) -> f64 {
+    let within = Timing {
+        max_offset: timing.max_offset.min(LARGEST_LAG),
+        ..timing.clone()
+    };
+    let found = estimate(robot, spec, &within, table, joints).ok();
+    let told = found
+        .map(|(_, map)| map)
+        .filter(|map| map.offset.abs() > SMALL_LAG.max(5.0 * map.offset_sigma));
+    told.map_or(0.0, |map| map.offset)
 }
 
 /// Speed of each joint per row, rad/s or m/s.
@@ -83,13 +111,18 @@ fn aligned(
     blanks::none_is_empty(joints.map(|(joint, stream)| (joint, stream.values.as_slice())))?;
     let mut full =
         tracker_table(recording, streams.line, &streams.times).map_err(DataProblem::NotATrack)?;
+    let repeated = streams.drop_repeated_frames(name, &mut full);
     let mut findings: Vec<Finding> = checks(&full, &Expectations::default())
         .into_iter()
         .filter(|f| f.severity != Severity::Error)
         .map(|f| f.in_recording(name))
         .chain(blanks::of_streams(name, &streams.joints))
+        .chain(repeated)
         .collect();
     let clocks = match streams.stated_clocks(timing) {
+        Some(ClockState::OneWithLag { .. }) => ClockState::OneWithLag {
+            start: large_lag(robot, spec, timing, (&full, &streams.joints)),
+        },
         Some(stated) => stated,
         None => {
             let (body, map) =
@@ -181,6 +214,25 @@ impl<'a> Streams<'a> {
         })
     }
 
+    /// Leaves the rows in which the tracker measured; what was found.
+    fn drop_repeated_frames(&mut self, name: &str, full: &mut Poses) -> Option<Finding> {
+        let one_line = |j: &&Scalars| j.timeline == self.line;
+        let joints: Vec<&Scalars> = self.joints.values().filter(one_line).collect();
+        let moves = |a: usize, b: usize| {
+            let moved = |j: &&Scalars| {
+                let [a, b] = [a, b].map(|row| j.at(self.times[row]));
+                a.zip(b).is_some_and(|(a, b)| (a - b).abs() > JITTER)
+            };
+            (!joints.is_empty()).then(|| joints.iter().any(moved))
+        };
+        let (kept, finding) = only_fresh(name, full, moves);
+        if finding.is_some() {
+            *full = full.select(&kept);
+            self.times = kept.iter().map(|&row| self.times[row]).collect();
+        }
+        finding
+    }
+
     /// What is known of the clocks without looking at the motion.
     fn stated_clocks(&self, timing: &Timing) -> Option<ClockState> {
         let of_robot = self.joints.values().next();
@@ -190,7 +242,7 @@ impl<'a> Streams<'a> {
                 && timing.clock == Clocks::Estimate
                 && !self.joints.is_empty();
             Some(match estimated {
-                true => ClockState::OneWithLag,
+                true => ClockState::OneWithLag { start: 0.0 },
                 false => ClockState::One,
             })
         } else if timing.clock == Clocks::Shared {

@@ -22,7 +22,10 @@ pub enum ClockState {
     /// They are one: the streams name the same clock.
     One,
     /// They are one, and by how much the joint values are late is found from the motion.
-    OneWithLag,
+    OneWithLag {
+        /// The offset, s, from which the fit starts: tracker minus robot, 0 where it is small.
+        start: f64,
+    },
     /// The profile declares them to be one.
     Declared,
     /// Found from the motion of a body.
@@ -40,7 +43,8 @@ impl ClockState {
     pub fn at_robot(&self, t: f64) -> f64 {
         match self {
             Self::Found { map, .. } => map.to_b(t),
-            Self::One | Self::OneWithLag | Self::Declared => t,
+            Self::OneWithLag { start } => t - start,
+            Self::One | Self::Declared => t,
         }
     }
 }
@@ -93,7 +97,7 @@ impl Alignment {
         match self.clocks {
             _ if self.holds.is_some() => ClockUnknowns::None,
             ClockState::One | ClockState::Declared => ClockUnknowns::None,
-            ClockState::OneWithLag => ClockUnknowns::Offset,
+            ClockState::OneWithLag { .. } => ClockUnknowns::Offset,
             ClockState::Found { .. } => ClockUnknowns::OffsetAndDrift,
         }
     }
@@ -107,7 +111,7 @@ impl Alignment {
         };
         let clocks = match &self.clocks {
             ClockState::One => "one clock".to_owned(),
-            ClockState::OneWithLag => {
+            ClockState::OneWithLag { .. } => {
                 "one clock; the fit estimates by how much the joint values are late".to_owned()
             }
             ClockState::Declared => "clocks stated to be the same".to_owned(),

@@ -10,6 +10,7 @@ pub(crate) mod effects;
 pub mod estimators;
 mod exchanged;
 pub mod excluded;
+mod fresh;
 pub mod inputs;
 pub mod load;
 pub mod loads;
