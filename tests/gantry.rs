@@ -280,4 +280,9 @@ fn a_gantry_whose_joints_are_called_x_y_and_z_is_read() {
         header.starts_with("line,joint:x_m,joint:y_m,joint:z_m,gc_deg"),
         "{header}"
     );
+    // A corrected program is a program.
+    let corrected = ran.expect(0).stdout;
+    let dir = dir.file("corrected.csv", corrected);
+    let ran = dir.calib(["predict", MODEL, "corrected.csv"]).expect(0);
+    assert_eq!(rows(&ran.stdout).len(), rows(&own).len());
 }

@@ -182,18 +182,24 @@ fn columns(robot: &Robot) -> impl Iterator<Item = (String, bool)> + '_ {
     })
 }
 
+/// First column of a corrected program.
+pub(crate) const LINE: &str = "line";
+
+/// Columns beside the joints of a corrected program; the first is before them.
+pub(crate) const NOTES: [&str; 6] = [
+    LINE,
+    "outcome",
+    "before_mm",
+    "after_mm",
+    "before_mrad",
+    "after_mrad",
+];
+
 fn header(csv: &mut Csv, robot: &Robot) {
-    csv.cell("line");
+    let (first, rest) = NOTES.split_at(1);
+    first.iter().for_each(|name| csv.cell(name));
     columns(robot).for_each(|(name, _)| csv.cell(&cell(&name)));
-    [
-        "outcome",
-        "before_mm",
-        "after_mm",
-        "before_mrad",
-        "after_mrad",
-    ]
-    .iter()
-    .for_each(|name| csv.cell(name));
+    rest.iter().for_each(|name| csv.cell(name));
     csv.end();
 }
 

@@ -4,7 +4,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use calib_model::{Model, Place, Pose};
-use calib_recording::{Filled, JointUnit, Poses, ReadOptions, WHOLE_ROBOT, read_path};
+use calib_recording::{
+    ColumnMap, Filled, JointUnit, Poses, Problem, ReadOptions, WHOLE_ROBOT, read_path,
+};
 
 use crate::error::ExportError;
 use crate::read::Robot;
@@ -50,7 +52,22 @@ pub(crate) fn program(path: &Path, model: &Model) -> Result<Program, ExportError
         of_robot: true,
         ..ReadOptions::default()
     };
-    let recording = read_path(path, &options)?;
+    let recording = read_path(path, &options).or_else(|error| match *error.problem {
+        // What `calib correct` wrote has its notes beside the joints.
+        Problem::UnknownColumn { ref name, .. } if name == crate::correct::LINE => {
+            let notes = crate::correct::NOTES.iter().map(|note| (*note).to_owned());
+            let columns = ColumnMap {
+                labels: notes.collect(),
+                ..ColumnMap::default()
+            };
+            let noted = ReadOptions {
+                columns: Some(columns),
+                ..options
+            };
+            read_path(path, &noted).map_err(|_| error)
+        }
+        _ => Err(error),
+    })?;
     let poses = recording
         .poses(Filled::Include)
         .map_err(|source| ExportError::NotOneTable {

@@ -34,6 +34,8 @@ pub struct Expectations {
     pub limits: BTreeMap<String, (f64, f64)>,
     /// Joint → range of motion that the sweep asks for, rad or m. These joints must move.
     pub asked: BTreeMap<String, (f64, f64)>,
+    /// Joint → what the joints that mimic it turn, rad, and slide, m, for a unit of its reading.
+    pub followers: BTreeMap<String, [f64; 2]>,
     /// Longest distance of anything on the robot from its base, m.
     pub reach: Option<f64>,
     /// Fewest rows that the fit can use.
@@ -59,7 +61,7 @@ pub fn checks(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
         &|| listed(rigidity::rigidity(poses, expected)),
         &|| listed(rows::repeated(poses)),
         &|| listed(motion::rotations(poses)),
-        &|| listed(motion::flips(poses)),
+        &|| listed(motion::flips(poses, expected)),
         &|| listed(motion::jumps(poses)),
         &|| listed(motion::gaps(poses)),
         &|| listed(motion::unsettled(poses, expected)),

@@ -76,14 +76,14 @@ struct Between {
 ///
 /// A body that moves away while it turns was carried by the robot, whatever the joints are said to have done: a logger that hung, a
 /// column that is missing. Where most of the sudden turns are of this kind, so are the few that end near their start by chance.
-pub(super) fn flips(poses: &Poses) -> Vec<Finding> {
+pub(super) fn flips(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
     let mut findings = Vec::new();
     for (name, track) in &poses.bodies {
         let seen: Vec<usize> = (0..track.len()).filter(|&i| track[i].is_some()).collect();
         let between = |w: &[usize]| {
             let (before, row) = (w[0], w[1]);
             let (a, b) = (track[before]?, track[row]?);
-            let (turned, slid) = joints_moved(poses, before, row);
+            let (turned, slid) = joints_moved(poses, expected, before, row);
             Some(Between {
                 row,
                 // What the joints turned between the rows needs no flip (a sweep that starts its next line).
@@ -127,17 +127,23 @@ fn carried(poses: &Poses, steps: &[Between]) -> impl Fn(&Between) -> f64 + use<>
     move |s| without_joints.unwrap_or(radius * s.turned + s.slid)
 }
 
-/// Sums of what the recorded joints turned, rad, and slid, m, between two rows: the most that a body on the robot can turn and slide.
-fn joints_moved(poses: &Poses, before: usize, after: usize) -> (f64, f64) {
+/// Sums of what the recorded joints and those that mimic them turned, rad, and slid, m, between two rows: the most that a body on the robot can turn
+/// and slide.
+fn joints_moved(poses: &Poses, expected: &Expectations, before: usize, after: usize) -> (f64, f64) {
     let (mut turned, mut slid) = (0.0, 0.0);
     for (name, q) in &poses.joints {
         let (Some(a), Some(b)) = (q[before], q[after]) else {
             continue;
         };
+        let by = (b - a).abs();
         if poses.joint_units.get(name) == Some(&JointUnit::Length) {
-            slid += (b - a).abs();
+            slid += by;
         } else {
-            turned += (b - a).abs();
+            turned += by;
+        }
+        if let Some([turn, slide]) = expected.followers.get(name) {
+            turned += turn * by;
+            slid += slide * by;
         }
     }
     (turned, slid)

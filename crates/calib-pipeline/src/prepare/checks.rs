@@ -10,7 +10,7 @@ use calib_finding::{About, Fact, Finding, Severity, Subject, Unit, catalog};
 use calib_profile::{BodyKind, Contact, Free, JointFree, Load, Usage};
 use calib_recording::Poses;
 use calib_report::RejectedFor;
-use calib_urdf::JointId;
+use calib_urdf::{JointId, JointKind, RobotModel};
 
 use crate::prepare::conditions::{missing_temperatures, missing_torques};
 use crate::prepare::inputs::{Inputs, Loaded};
@@ -209,6 +209,21 @@ pub fn stops(findings: &[Finding]) -> bool {
     findings.iter().any(|f| f.severity == Severity::Error)
 }
 
+/// Joint → what the joints that mimic it turn and slide for a unit of its reading, of those without readings of their own.
+fn followers(model: &RobotModel, loaded: &Loaded) -> BTreeMap<String, [f64; 2]> {
+    let mut out: BTreeMap<String, [f64; 2]> = BTreeMap::new();
+    for id in model.joint_ids() {
+        let joint = model.joint(id);
+        if joint.law.source == id || loaded.poses.joints.contains_key(&joint.name) {
+            continue;
+        }
+        let source = model.joint(joint.law.source).name.clone();
+        let slides = usize::from(matches!(joint.kind, JointKind::Prismatic { .. }));
+        out.entry(source).or_default()[slides] += joint.law.multiplier.abs();
+    }
+    out
+}
+
 fn expectations(inputs: &Inputs, loaded: &Loaded) -> Expectations {
     let model = &inputs.robot.model;
     let profile = &inputs.robot.profile;
@@ -234,6 +249,7 @@ fn expectations(inputs: &Inputs, loaded: &Loaded) -> Expectations {
     Expectations {
         bodies,
         templates,
+        followers: followers(model, loaded),
         template_sigmas: profile
             .bodies
             .iter()

@@ -28,10 +28,11 @@ fn joint_of(column: &str) -> Option<&str> {
 }
 
 /// The robot's joints whose columns read as coordinates. Three coordinates of one thing may be a marker: they are joints where all three are called
-/// so, and coordinates without a name where other markers or bodies have one, or where the robot alone wrote the table.
+/// so, and coordinates without a name where other markers or bodies have one (`tracked`: in the column map), or where the robot alone wrote the table.
 fn joints_like_coordinates<'n>(
     names: &'n [String],
     mapped: &[bool],
+    tracked: bool,
     known: Known<'_>,
 ) -> Vec<&'n str> {
     let own = names.iter().zip(mapped).filter(|(_, mapped)| !**mapped);
@@ -39,7 +40,8 @@ fn joints_like_coordinates<'n>(
     if known.joints.is_empty() || meanings().any(|m| matches!(m, Meaning::Entity)) {
         return Vec::new();
     }
-    let others = known.of_robot
+    let others = tracked
+        || known.of_robot
         || meanings().any(|m| matches!(m, Meaning::Part { entity, .. } if !entity.is_empty()));
     let is_joint = |name: &str| known.joints.iter().any(|joint| joint == name);
     let coordinates: Vec<&str> = own.filter_map(|(name, _)| joint_of(name)).collect();
@@ -82,7 +84,9 @@ impl Layout {
         // A column `point` beside named markers is somebody's remark.
         let is_nameless = |name: &String| matches!(meaning(name), Meaning::Part { entity: "", .. });
         let nameless = names.iter().any(is_nameless);
-        let joints = joints_like_coordinates(&names, mapped, known);
+        // Before the rules there is what the map names.
+        let tracked = self.slots.iter().any(|s| s.kind == SlotKind::Tracker);
+        let joints = joints_like_coordinates(&names, mapped, tracked, known);
         for (i, name) in names.iter().enumerate().filter(|&(i, _)| !mapped[i]) {
             match of_joint(name, &joints).unwrap_or_else(|| meaning(name)) {
                 Meaning::Time(unit) if self.time.is_none() => {
