@@ -5,7 +5,7 @@ use crate::rigid_body::{computed_below, decimal_grid};
 use crate::statistics::{median, range};
 use calib_finding::{About, Fact, Finding, Subject, catalog};
 use calib_recording::Poses;
-use nalgebra::Point3;
+use nalgebra::{Point3, Vector3};
 use std::collections::BTreeMap;
 
 /// Rows of exactly equal values that make a frozen marker: two may happen by rounding.
@@ -22,6 +22,8 @@ const ROWS_FOR_SCATTER: usize = 5;
 const ENOUGH_ROWS: usize = 1000;
 /// Nothing is tracked from farther away, m: laser trackers reach 160 m. More is millimeters taken for meters.
 const LARGEST_VOLUME: f64 = 200.0;
+/// Ratio of what two bodies of one robot move, from which they are in different units.
+const ANOTHER_UNIT: f64 = 50.0;
 
 type Track = [Option<Point3<f64>>];
 
@@ -43,39 +45,75 @@ pub(super) fn zeros(poses: &Poses) -> Vec<Finding> {
     findings
 }
 
+/// What a marker or body shows of the unit it is written in.
+struct Extent<'a> {
+    name: &'a str,
+    places: Vec<Vector3<f64>>,
+}
+
+impl Extent<'_> {
+    /// Largest range of a coordinate, m.
+    fn spread<'e>(extents: impl Iterator<Item = &'e Extent<'e>> + Clone) -> f64 {
+        let along = |axis: usize| {
+            let places = extents.clone().flat_map(|e| &e.places);
+            range(places.map(|p| p[axis]))
+        };
+        let ranges = (0..3).filter_map(along).map(|(low, high)| high - low);
+        ranges.fold(0.0, f64::max)
+    }
+
+    /// Largest distance from the tracker's origin, m.
+    fn farthest(&self) -> f64 {
+        self.places.iter().map(Vector3::norm).fold(0.0, f64::max)
+    }
+}
+
 pub(super) fn length_unit(poses: &Poses, expected: &Expectations) -> Option<Finding> {
-    let points = poses
-        .markers
-        .values()
-        .flatten()
-        .flatten()
-        .map(|point| point.coords);
-    let poses_at = poses
-        .bodies
-        .values()
-        .flatten()
-        .flatten()
-        .map(|pose| pose.translation.vector);
-    let all: Vec<_> = points.chain(poses_at).collect();
-    let largest_extent = (0..3)
-        .filter_map(|axis| range(all.iter().map(|p| p[axis])))
-        .map(|(low, high)| high - low)
-        .fold(0.0, f64::max);
-    let farthest = all.iter().map(nalgebra::Vector3::norm).fold(0.0, f64::max);
+    let points = poses.markers.iter().map(|(name, track)| Extent {
+        name,
+        places: track.iter().flatten().map(|p| p.coords).collect(),
+    });
+    let poses_at = poses.bodies.iter().map(|(name, track)| Extent {
+        name,
+        places: track
+            .iter()
+            .flatten()
+            .map(|p| p.translation.vector)
+            .collect(),
+    });
+    let all: Vec<Extent<'_>> = points.chain(poses_at).collect();
+    let farthest = all.iter().map(Extent::farthest).fold(0.0, f64::max);
     let finding = |kind| Finding::of_kind(catalog::UNIT_MISMATCH, kind, About::Lengths);
-    let too_far = expected
-        .reach
-        .is_some_and(|reach| largest_extent > 20.0 * reach)
-        || farthest > LARGEST_VOLUME;
-    if too_far {
+    let is_too_far = |spread: f64, farthest: f64| {
+        expected.reach.is_some_and(|reach| spread > 20.0 * reach) || farthest > LARGEST_VOLUME
+    };
+    let spread = Extent::spread(all.iter());
+    if is_too_far(spread, farthest) {
+        // Markers or bodies that move by far more than the others are in another unit.
+        let own = |e: &Extent<'_>| Extent::spread(std::iter::once(e));
+        let (far, near): (Vec<&Extent<'_>>, Vec<&Extent<'_>>) = all
+            .iter()
+            .filter(|e| !e.places.is_empty())
+            .partition(|e| is_too_far(own(e), e.farthest()));
+        let of_near = Extent::spread(near.iter().copied());
+        let of_far = Extent::spread(far.iter().copied());
+        if of_near > MOVED && of_far > ANOTHER_UNIT * of_near {
+            return Some(
+                finding("some_millimeters")
+                    .with("names", Fact::names(far.iter().map(|e| e.name)))
+                    .with("spread", Fact::meters(of_far))
+                    .with("others", Fact::meters(of_near)),
+            );
+        }
         return Some(
             finding("millimeters")
-                .with("spread", Fact::meters(largest_extent))
+                .with("spread", Fact::meters(spread))
                 .with("farthest", Fact::meters(farthest)),
         );
     }
     // Below 1 cm from the tracker's origin at all times: meters divided by a thousand.
-    if all.len() >= 3 && farthest < 1e-2 && farthest > 0.0 {
+    let places = all.iter().map(|e| e.places.len()).sum::<usize>();
+    if places >= 3 && farthest < 1e-2 && farthest > 0.0 {
         return Some(finding("meters").with("farthest", Fact::meters(farthest)));
     }
     None

@@ -550,6 +550,25 @@ fn clean_recordings_are_silent() {
     assert!(alarms.is_empty(), "{alarms:#?}");
 }
 
+#[test]
+fn a_body_in_another_unit_than_the_others_is_named() {
+    for seed in 0..SEEDS {
+        let mut recorded = record(3000 + seed, false);
+        let track = recorded.poses.bodies.get_mut("tool").expect("recorded");
+        for pose in track.iter_mut().flatten() {
+            pose.translation.vector *= 1e3;
+        }
+        let found = checks(&recorded.poses, &recorded.expected);
+        let of_units: Vec<&Finding> = found
+            .iter()
+            .filter(|f| f.id == catalog::UNIT_MISMATCH)
+            .collect();
+        assert_eq!(of_units.len(), 1, "{found:#?}");
+        let text = of_units[0].text();
+        assert!(text.starts_with("The places of tool spread over"), "{text}");
+    }
+}
+
 pub fn recorded_q(poses: &Poses) -> Vec<[f64; 3]> {
     (0..poses.len())
         .map(|i| JOINTS.map(|joint| poses.joints[joint][i].expect("recorded")))

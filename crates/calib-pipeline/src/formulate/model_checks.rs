@@ -4,7 +4,7 @@
 use std::collections::BTreeMap;
 
 use calib_checks::model::up_axis;
-use calib_finding::{Finding, Subject};
+use calib_finding::{Fact, Finding, Subject};
 use calib_profile::{UpAxis, Usage};
 
 use crate::estimate::start::Start;
@@ -24,6 +24,11 @@ pub fn before_the_fit(
     start: &Start,
     findings: &mut Vec<Finding>,
 ) {
+    // Bodies in different units fit no robot, and a hypothesis would explain the rest.
+    let mixed = |f: &Finding| f.facts.get("kind").and_then(Fact::word) == Some("some_millimeters");
+    if findings.iter().any(mixed) {
+        return;
+    }
     let found = structural(inputs, tracks);
     let recordings = inputs.recordings.iter();
     let fitted = recordings.filter(|(_, r)| r.spec.usage != Usage::Validation);
