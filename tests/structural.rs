@@ -364,6 +364,34 @@ fn a_joint_that_follows_another_one_the_wrong_way_is_named() {
     assert!(remedy.contains(expected), "{remedy}");
 }
 
+/// An arm that is symmetric about a plane moves in a mirror as with the joints reversed whose axes lie in it: no recording tells the two.
+#[test]
+fn signs_that_look_like_a_mirror_are_named_beside_it() {
+    for (markers, seed) in [(FOUR, 11), (ONE, 12)] {
+        let setting = Setting::new(Design::Random(40), markers, seed);
+        let tables = setting.tables();
+        let negated = |names: &[&str]| {
+            names.iter().fold(setting.folder(), |dir, name| {
+                column(dir, &tables, name, |x| -x)
+            })
+        };
+        let of_tracker: Vec<String> = (1..=markers.len()).map(|k| format!("m{k}.y_m")).collect();
+        let of_tracker: Vec<&str> = of_tracker.iter().map(String::as_str).collect();
+        for dir in [
+            negated(&["waist_deg", "wrist_roll_deg"]),
+            negated(&of_tracker),
+        ] {
+            let found = findings(&dir);
+            let mirrored = found.iter().find(|f| f["id"] == "mirrored");
+            let same = mirrored.expect("named")["facts"]["equivalent"].to_string();
+            assert!(
+                same.contains("sign(waist) + sign(wrist_roll)"),
+                "{found:#?}"
+            );
+        }
+    }
+}
+
 #[test]
 fn a_wrong_sign_seen_by_one_marker() {
     for (design, seed) in [(Design::Random(30), 4), (Design::Sweeps, 5)] {

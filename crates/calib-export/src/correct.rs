@@ -8,7 +8,7 @@ use calib_recording::joint_column;
 
 use crate::error::ExportError;
 use crate::read::Robot;
-use crate::table::{Csv, program};
+use crate::table::{Csv, NOTES, program};
 
 /// What is corrected.
 #[derive(Debug, Clone, Default)]
@@ -181,19 +181,6 @@ fn columns(robot: &Robot) -> impl Iterator<Item = (String, bool)> + '_ {
         (joint_column(&j.name, unit), j.prismatic)
     })
 }
-
-/// First column of a corrected program.
-pub(crate) const LINE: &str = "line";
-
-/// Columns beside the joints of a corrected program; the first is before them.
-pub(crate) const NOTES: [&str; 6] = [
-    LINE,
-    "outcome",
-    "before_mm",
-    "after_mm",
-    "before_mrad",
-    "after_mrad",
-];
 
 fn header(csv: &mut Csv, robot: &Robot) {
     let (first, rest) = NOTES.split_at(1);

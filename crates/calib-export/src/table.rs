@@ -11,6 +11,19 @@ use calib_recording::{
 use crate::error::ExportError;
 use crate::read::Robot;
 
+/// First column of a corrected program.
+const LINE: &str = "line";
+
+/// Columns beside the joints of a corrected program; the first is before them.
+pub(crate) const NOTES: [&str; 6] = [
+    LINE,
+    "outcome",
+    "before_mm",
+    "after_mm",
+    "before_mrad",
+    "after_mrad",
+];
+
 /// Joint positions by row, in the order of [`Model::joints`].
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Program {
@@ -54,8 +67,8 @@ pub(crate) fn program(path: &Path, model: &Model) -> Result<Program, ExportError
     };
     let recording = read_path(path, &options).or_else(|error| match *error.problem {
         // What `calib correct` wrote has its notes beside the joints.
-        Problem::UnknownColumn { ref name, .. } if name == crate::correct::LINE => {
-            let notes = crate::correct::NOTES.iter().map(|note| (*note).to_owned());
+        Problem::UnknownColumn { ref name, .. } if name == LINE => {
+            let notes = NOTES.iter().map(|note| (*note).to_owned());
             let columns = ColumnMap {
                 labels: notes.collect(),
                 ..ColumnMap::default()

@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use calib_checks::structural::{
     Chain, Correction, Decision, Hypothesis, Outcome, RecordingIndex, Scoped,
 };
-use calib_urdf::{LinkId, RobotModel, doubt};
+use calib_urdf::{Joint, LinkId, RobotModel, doubt};
 
 use crate::correct;
 use crate::error::InitError;
@@ -207,8 +207,12 @@ pub fn next_correction(
     // Of corrections that the recordings do not distinguish, one that a column map can hold.
     let mut first = None;
     let is_of_tables = |c: &Correction| c.iter().any(|s| !is_of_links(&s.hypothesis));
+    // Readings that are within the URDF's limits as they are, and would not be: another explanation is the right one.
+    let within: Vec<bool> = all.iter().map(|c| stays_within_limits(scene, c)).collect();
+    let some_are = within.iter().any(|w| *w);
     for (i, correction) in all.iter().enumerate() {
-        if i > 0 && !is_of_tables(correction) {
+        let another = i > 0 && (!is_of_tables(correction) || correction.len() > 1);
+        if another || (some_are && !within[i]) {
             continue;
         }
         let others = all.iter().enumerate().filter(|(k, _)| *k != i);
@@ -227,6 +231,31 @@ pub fn next_correction(
         next.sources = applied.sources;
     }
     Ok(next)
+}
+
+/// Whether readings that are within the URDF's limits stay there with joints counted the other way.
+fn stays_within_limits(scene: &Scene<'_>, correction: &Correction) -> bool {
+    /// Half a degree, or 9 mm: as the limits are checked.
+    const TOLERANCE: f64 = 0.009;
+    let stays = |joint: &Joint| {
+        let Some((low, high)) = joint.limits.range() else {
+            return true;
+        };
+        let tables = scene.tables.iter();
+        let readings = || {
+            tables
+                .clone()
+                .filter_map(|t| t.joints.get(&joint.name))
+                .flatten()
+                .flatten()
+        };
+        let inside = |q: f64| (low - TOLERANCE..=high + TOLERANCE).contains(&q);
+        !readings().all(|q| inside(*q)) || readings().all(|q| inside(-q))
+    };
+    correction.iter().all(|scoped| match scoped.hypothesis {
+        Hypothesis::Sign { joint } => stays(&scene.model.joints()[joint.0]),
+        _ => true,
+    })
 }
 
 /// What is said where no mistake is named.
@@ -378,7 +407,11 @@ pub fn apply_one(
             residuals,
             equivalent: equivalent.to_vec(),
         },
-        None => About::NotCorrected { mistake, residuals },
+        None => About::NotCorrected {
+            mistake,
+            residuals,
+            equivalent: equivalent.to_vec(),
+        },
     };
     Ok((Fact::new(place_of(drafts, scoped), about), done))
 }

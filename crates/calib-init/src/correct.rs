@@ -254,11 +254,21 @@ fn renamed(source: &Source, map: &ColumnMap, columns: &[String], unit: &str) -> 
     if columns.is_empty() || map.decimal_comma {
         return None;
     }
-    let new = |name: &String| match columns.contains(name) {
-        true => format!("{}_{unit}", name::unit(name).stem),
-        false => name.clone(),
-    };
     let mut renamed = map.clone();
+    // One word for the lengths of a map would contradict the new names: all of them state their unit then.
+    let is_length = LengthUnit::ALL.into_iter().any(|u| u.name() == unit);
+    let mut of_map = Vec::new();
+    if is_length && map.lengths != LengthUnit::M {
+        of_map = places(source, map);
+        of_map.extend(map.prismatic.values().cloned());
+        of_map.retain(|column| !name::unit(column).native);
+        renamed.lengths = LengthUnit::M;
+    }
+    let new = |name: &String| match (columns.contains(name), of_map.contains(name)) {
+        (true, _) => format!("{}_{unit}", name::unit(name).stem),
+        (false, true) => format!("{}_{}", name::unit(name).stem, map.lengths.name()),
+        (false, false) => name.clone(),
+    };
     let names = if map.names.is_empty() {
         &table.names
     } else {

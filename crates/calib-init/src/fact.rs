@@ -312,6 +312,8 @@ pub enum About {
         mistake: Mistake,
         /// What it explains.
         residuals: Residuals,
+        /// Corrections that the recordings do not distinguish from it.
+        equivalent: Vec<Vec<Mistake>>,
     },
     /// No mistake stands out: signs, order, units and links agree with the robot.
     Agrees {

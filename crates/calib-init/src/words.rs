@@ -96,10 +96,15 @@ pub fn sentence(about: &About) -> String {
             residuals,
             equivalent,
         } => corrected(mistake, residuals, equivalent),
-        About::NotCorrected { mistake, residuals } => format!(
-            "{} It explains the recordings ({}), but no profile corrects it: correct the table, or see what `calib check` says.",
+        About::NotCorrected {
+            mistake,
+            residuals,
+            equivalent,
+        } => format!(
+            "{} It explains the recordings ({}), but no profile corrects it: correct the table, or see what `calib check` says.{}",
             found(mistake),
-            improvement(residuals)
+            improvement(residuals),
+            not_distinguished(equivalent)
         ),
         About::Agrees {
             rms,
@@ -424,7 +429,8 @@ fn improvement(residuals: &Residuals) -> String {
     )
 }
 
-fn corrected(mistake: &Mistake, residuals: &Residuals, equivalent: &[Vec<Mistake>]) -> String {
+/// The corrections that explain the recordings as well.
+fn not_distinguished(equivalent: &[Vec<Mistake>]) -> String {
     const MOST: usize = 3;
     let mut others: Vec<String> = equivalent
         .iter()
@@ -434,13 +440,17 @@ fn corrected(mistake: &Mistake, residuals: &Residuals, equivalent: &[Vec<Mistake
     if equivalent.len() > MOST {
         others.push(format!("{} more.", equivalent.len() - MOST));
     }
-    let others = match others.is_empty() {
+    match others.is_empty() {
         true => String::new(),
         false => format!(
             " These recordings do not distinguish it from: {}",
             others.join(" Or: ")
         ),
-    };
+    }
+}
+
+fn corrected(mistake: &Mistake, residuals: &Residuals, equivalent: &[Vec<Mistake>]) -> String {
+    let others = not_distinguished(equivalent);
     let doubt = residuals.over.map_or_else(String::new, |limit| {
         format!(
             " This is not certain: errors of 1° and 10 mm explain {} only, so that another mistake may be behind it.",

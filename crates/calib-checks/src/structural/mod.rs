@@ -63,6 +63,7 @@ mod ids;
 mod jump;
 mod likelihood;
 mod linear;
+mod mirror;
 mod moments;
 mod moved;
 mod naming;

@@ -4,9 +4,10 @@ use super::apply::{apply, apply_all};
 use super::candidates::Candidate;
 use super::data::Data;
 use super::expected::expected;
-use super::hypothesis::Scoped;
+use super::hypothesis::{Hypothesis, Scoped};
 use super::ids::SampleIndex;
-use super::outcome::{Evidence, Named, Options};
+use super::mirror::sign_patterns;
+use super::outcome::{Correction, Evidence, Named, Options};
 use super::ranking::{Ranking, ratio};
 use super::scan::{Scan, Scored};
 use super::score::score;
@@ -61,6 +62,7 @@ impl Asked<'_> {
         };
         let times = |s: &Scored| ratio(s.score.score, best.score.score);
         let corrected = apply(&best.scoped, self.data);
+        let mirrored = self.like_a_mirror(&best.scoped, &twin);
         Named {
             correction: vec![best.scoped],
             alternatives: others()
@@ -74,10 +76,27 @@ impl Asked<'_> {
                 ratio: ranking.ratio(best.score.score),
             },
             left: self.left(&corrected),
-            equivalent: equivalent.into_iter().map(|s| vec![s]).collect(),
+            equivalent: equivalent
+                .into_iter()
+                .map(|s| vec![s])
+                .chain(mirrored)
+                .collect(),
             within_expected: None,
             allowing: None,
         }
+    }
+
+    /// Signs of several joints that a mirrored tracker is not distinguished from.
+    fn like_a_mirror(&self, best: &Scoped, twin: &Data) -> Vec<Correction> {
+        if best.hypothesis != Hypothesis::Mirrored {
+            return Vec::new();
+        }
+        let fits = |correction: &Correction| {
+            let corrected = apply_all(correction, twin);
+            Scan::new(&corrected, self.screened).none().rms < self.options.twin_tolerance
+        };
+        let patterns = sign_patterns(self.data, best.scope);
+        patterns.into_iter().filter(fits).collect()
     }
 
     /// By how much the best further hypothesis divides the residual of corrected data.
