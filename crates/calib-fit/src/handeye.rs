@@ -245,8 +245,8 @@ fn remedy(request: &HandEyeRequest, e: &HandEye, rows: &[u64]) -> Option<String>
                     .to_owned()
             }
             Correction::Scaled(_) => {
-                "Check the size of the board's squares or of the tag as it was stated, and the tracker's or camera's calibration; then multiply the positions \
-                 or measure them again."
+                "Check the size of the board's squares or of the tag as it was stated, the tracker's or camera's calibration, and the robot's own lengths; then \
+                 measure again."
                     .to_owned()
             }
             Correction::BodyMoved(pose) => format!(

@@ -5,7 +5,7 @@
 //! ```
 //!
 //! Each is fitted beside X and Z: one factor on the measured positions, or a second X or Z from some row on, for every row. The best is
-//! judged by (8), times the number that was tried. One that lowers a residual by [`SHOWN`] is an explanation; a smaller one
+//! judged by (8), times the number that was tried. One that lowers a residual by [`SHOWN`] and leaves noise is an explanation; another one
 //! adds what it does to X and Z to their covariance.
 
 use calib_estimator::chance::chi2_tail;
@@ -20,8 +20,15 @@ use crate::{
     residuals::{Residuals, squares},
 };
 
-/// Ratio of residuals from which an effect is an explanation, and not only a part of the uncertainty.
-const SHOWN: f64 = 1.1;
+/// Ratio of residuals from which an effect can be an explanation, and not only a part of the uncertainty.
+const SHOWN: f64 = 1.3;
+/// Ratio from which it is one whatever it leaves.
+const FAR: f64 = 3.0;
+/// A move is at one row: this many rows beside it, it explains less by [`STEP`] squares of what noise is left.
+const APART: usize = 2;
+const STEP: f64 = 40.0;
+/// Chance of a further effect below which what is left is no noise.
+const LEFT: f64 = 0.01;
 /// Poses on either side of a move: three determine a transform, one more judges it.
 const SIDE: usize = 4;
 /// Fewest poses that are judged.
@@ -48,6 +55,8 @@ struct Effect {
     /// X and Z beside it: those of the rows before a move, and those after it.
     fits: Vec<Minimum>,
     parameters: f64,
+    /// By how much a move one or more rows beside its own explains less, in squares of the residuals' σ before it; infinite for a factor.
+    sharpness: f64,
 }
 
 /// What the residuals say beyond noise.
@@ -87,35 +96,14 @@ pub(crate) fn unmodelled(
     }
     let [a, b] = tables.map(|poses| chosen(poses, kept));
     let none = minimized(&a, &b, w);
-    let before = sums(&a, &b, &none);
-    let splits = moves(&a, &b, &none, w);
-    let tried = 1.0 + splits.tried as f64;
-    let effects = std::iter::once(scale(&a, &b, &none, w)).chain(
-        splits
-            .best
-            .map(|(part, row)| moved_from(&a, &b, &none, w, part, row)),
-    );
-    let chance = |e: &Effect| {
-        let freedom = 3.0 * a.len() as f64 - 6.0 - 0.5 * e.parameters;
-        let after = sums(&a, &e.measured, &e.fits[0]);
-        let ratio = (before[0] / after[0]).ln() + (before[1] / after[1]).ln();
-        tried * chi2_tail(freedom * ratio, e.parameters)
-    };
-    let Some((best, p)) = effects
-        .map(|e| (chance(&e), e))
-        .map(|(p, e)| (e, p))
-        .min_by(|x, y| x.1.total_cmp(&y.1))
-    else {
+    let Some((best, p)) = largest(&a, &b, &none, w) else {
         return out;
     };
     if p >= significance {
         return out;
     }
-    let after = sums(&a, &best.measured, &best.fits[0]);
-    let ratio = (0..2)
-        .map(|k| (before[k] / after[k]).sqrt())
-        .fold(0.0, f64::max);
-    if ratio < SHOWN {
+    let [before, after] = [sums(&a, &b, &none), sums(&a, &best.measured, &best.fits[0])];
+    if !stands_out(&a, &best, [before, after], w) {
         for fit in &best.fits {
             let by = difference(&none, fit);
             out.covariance += by * by.transpose();
@@ -130,6 +118,51 @@ pub(crate) fn unmodelled(
     out.explanation =
         Some(explained(correction, [before, after], [a.len(); 2])).filter(|e| plausible(&e.after));
     out
+}
+
+/// The effect that chance explains least, with its chance (8), times the number that was tried.
+fn largest(
+    a: &[Isometry3<f64>],
+    b: &[Isometry3<f64>],
+    none: &Minimum,
+    w: Weights,
+) -> Option<(Effect, f64)> {
+    let before = sums(a, b, none);
+    let splits = moves(a, b, none, w);
+    let tried = 1.0 + splits.tried as f64;
+    let moved = splits.best.map(|(part, row)| Effect {
+        sharpness: splits.sharpness,
+        ..moved_from(a, b, none, w, part, row)
+    });
+    let chance = |e: &Effect| {
+        let freedom = 3.0 * a.len() as f64 - 6.0 - 0.5 * e.parameters;
+        let after = sums(a, &e.measured, &e.fits[0]);
+        let ratio = (before[0] / after[0]).ln() + (before[1] / after[1]).ln();
+        tried * chi2_tail(freedom * ratio, e.parameters)
+    };
+    let effects = std::iter::once(scale(a, b, none, w)).chain(moved);
+    let judged = effects.map(|e| {
+        let p = chance(&e);
+        (e, p)
+    });
+    judged.min_by(|x, y| x.1.total_cmp(&y.1))
+}
+
+/// Whether an effect is what it is called: it lowers a residual by [`SHOWN`], a move is at one row and not about it, and what is left is noise. Errors of the
+/// robot's own geometry change along ordered poses as well, but little by little, and leave as much of their kind; only what is far larger than these is
+/// named beside them.
+fn stands_out(
+    a: &[Isometry3<f64>],
+    effect: &Effect,
+    [before, after]: [[f64; 2]; 2],
+    w: Weights,
+) -> bool {
+    let ratio = (0..2)
+        .map(|k| (before[k] / after[k]).sqrt())
+        .fold(0.0, f64::max);
+    let left = || largest(a, &effect.measured, &effect.fits[0], w).map_or(1.0, |(_, p)| p);
+    let is_a_step = effect.sharpness * ratio * ratio >= STEP;
+    is_a_step && (ratio >= FAR || (ratio >= SHOWN && left() >= LEFT))
 }
 
 fn explained(correction: Correction, sums: [[f64; 2]; 2], rows: [usize; 2]) -> Explanation {
@@ -147,8 +180,12 @@ fn explained(correction: Correction, sums: [[f64; 2]; 2], rows: [usize; 2]) -> E
 /// A move that makes good poses of those that were taken for gross errors.
 fn brought_back([a, b]: [&[Isometry3<f64>]; 2], kept: &[usize], w: Weights) -> Option<Explanation> {
     let of_kept = minimized(&chosen(a, kept), &chosen(b, kept), w);
-    let (part, row) = moves(a, b, &of_kept, w).best?;
-    let effect = moved_from(a, b, &of_kept, w, part, row);
+    let splits = moves(a, b, &of_kept, w);
+    let (part, row) = splits.best?;
+    let effect = Effect {
+        sharpness: splits.sharpness,
+        ..moved_from(a, b, &of_kept, w, part, row)
+    };
     let keeps = gross::kept(a, &effect.measured, w);
     if keeps.len() < kept.len() + BROUGHT_BACK {
         return None;
@@ -245,12 +282,15 @@ fn scale(a: &[Isometry3<f64>], b: &[Isometry3<f64>], none: &Minimum, w: Weights)
         measured: by(factor),
         fits: vec![fit],
         parameters: 1.0,
+        sharpness: f64::INFINITY,
     }
 }
 
 /// The best row of a move, and how many were tried.
 struct Moves {
     best: Option<(Part, usize)>,
+    /// As [`Effect::sharpness`].
+    sharpness: f64,
     tried: usize,
 }
 
@@ -259,8 +299,7 @@ fn moves(a: &[Isometry3<f64>], b: &[Isometry3<f64>], fit: &Minimum, w: Weights) 
     let n = a.len();
     let (all, gradient, _) = linearize(a, b, &fit.x, &fit.z, w);
     let (mut h, mut g) = (SMatrix::<f64, 12, 12>::zeros(), SVector::<f64, 12>::zeros());
-    let mut best: Option<(f64, Part, usize)> = None;
-    let mut tried = 0;
+    let mut all_of: Vec<(f64, Part, usize)> = Vec::new();
     for row in (SIDE..n).rev() {
         let (of_row, of_gradient, _) = linearize(&a[row..=row], &b[row..=row], &fit.x, &fit.z, w);
         h += of_row;
@@ -286,15 +325,19 @@ fn moves(a: &[Isometry3<f64>], b: &[Isometry3<f64>], fit: &Minimum, w: Weights) 
             else {
                 continue;
             };
-            tried += 1;
-            if best.is_none_or(|(most, ..)| decrease > most) {
-                best = Some((decrease, part, row));
-            }
+            all_of.push((decrease, part, row));
         }
     }
+    let best = all_of.iter().copied().max_by(|x, y| x.0.total_cmp(&y.0));
+    let sharpness = best.map_or(0.0, |(most, part, row)| {
+        let apart = |other: &&(f64, Part, usize)| other.1 == part && other.2.abs_diff(row) >= APART;
+        let others = all_of.iter().filter(apart).map(|other| other.0);
+        most - others.fold(0.0, f64::max)
+    });
     Moves {
         best: best.map(|(_, part, row)| (part, row)),
-        tried,
+        sharpness,
+        tried: all_of.len(),
     }
 }
 
@@ -362,5 +405,6 @@ fn moved_from(
         measured: measured.collect(),
         fits: fits.to_vec(),
         parameters: 6.0,
+        sharpness: 0.0,
     }
 }
