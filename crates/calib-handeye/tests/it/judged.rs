@@ -1,5 +1,7 @@
 //! What the table's estimators say of their own answers: uncertainty, rows with gross errors, structural mistakes.
 
+use std::f64::consts::TAU;
+
 use calib_estimator::{Input, Options, Verdict, chance::f_quantile};
 use calib_handeye::{Correction, HandEye, HandEyeWeights, Side, estimators, solve_ax_zb};
 use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, UnitQuaternion, Vector3};
@@ -366,13 +368,13 @@ fn errors_of_the_robot_along_a_path_are_no_move() {
     let named = (0..SEEDS).filter(|seed| {
         let mut r = ChaCha8Rng::seed_from_u64(900 + seed);
         let waves: Vec<[f64; 2]> = (0..9)
-            .map(|_| [r.random_range(0.5..1.5), r.random_range(0.0..6.28)])
+            .map(|_| [r.random_range(0.5..1.5), r.random_range(0.0..TAU)])
             .collect();
         let mut case = case(800 + seed, 30, [5e-4, 2e-3]);
         let z = random_pose(&mut r, 3.1);
         let wave = |k: usize, at: f64| (waves[k][0] * at + waves[k][1]).sin();
         for i in 0..30 {
-            let at = 6.28 * f64::from(i) / 30.0;
+            let at = TAU * f64::from(i) / 30.0;
             let place = Vector3::from_fn(|k, _| 0.3 * wave(k, at));
             let turn = Vector3::from_fn(|k, _| 0.8 * wave(3 + k, at));
             let a = Isometry3::new(place, turn);
