@@ -56,7 +56,7 @@ struct Effect {
     fits: Vec<Minimum>,
     parameters: f64,
     /// By how much a move one or more rows beside its own explains less, in squares of the residuals' σ before it; infinite for a factor.
-    sharpness: f64,
+    lost_beside: f64,
 }
 
 /// What the residuals say beyond noise.
@@ -131,7 +131,7 @@ fn largest(
     let splits = moves(a, b, none, w);
     let tried = 1.0 + splits.tried as f64;
     let moved = splits.best.map(|(part, row)| Effect {
-        sharpness: splits.sharpness,
+        lost_beside: splits.lost_beside,
         ..moved_from(a, b, none, w, part, row)
     });
     let chance = |e: &Effect| {
@@ -161,7 +161,7 @@ fn stands_out(
         .map(|k| (before[k] / after[k]).sqrt())
         .fold(0.0, f64::max);
     let left = || largest(a, &effect.measured, &effect.fits[0], w).map_or(1.0, |(_, p)| p);
-    let is_a_step = effect.sharpness * ratio * ratio >= STEP;
+    let is_a_step = effect.lost_beside * ratio * ratio >= STEP;
     is_a_step && (ratio >= FAR || (ratio >= SHOWN && left() >= LEFT))
 }
 
@@ -183,7 +183,7 @@ fn brought_back([a, b]: [&[Isometry3<f64>]; 2], kept: &[usize], w: Weights) -> O
     let splits = moves(a, b, &of_kept, w);
     let (part, row) = splits.best?;
     let effect = Effect {
-        sharpness: splits.sharpness,
+        lost_beside: splits.lost_beside,
         ..moved_from(a, b, &of_kept, w, part, row)
     };
     let keeps = gross::kept(a, &effect.measured, w);
@@ -282,15 +282,15 @@ fn scale(a: &[Isometry3<f64>], b: &[Isometry3<f64>], none: &Minimum, w: Weights)
         measured: by(factor),
         fits: vec![fit],
         parameters: 1.0,
-        sharpness: f64::INFINITY,
+        lost_beside: f64::INFINITY,
     }
 }
 
 /// The best row of a move, and how many were tried.
 struct Moves {
     best: Option<(Part, usize)>,
-    /// As [`Effect::sharpness`].
-    sharpness: f64,
+    /// As [`Effect::lost_beside`].
+    lost_beside: f64,
     tried: usize,
 }
 
@@ -329,14 +329,14 @@ fn moves(a: &[Isometry3<f64>], b: &[Isometry3<f64>], fit: &Minimum, w: Weights) 
         }
     }
     let best = all_of.iter().copied().max_by(|x, y| x.0.total_cmp(&y.0));
-    let sharpness = best.map_or(0.0, |(most, part, row)| {
+    let lost_beside = best.map_or(0.0, |(most, part, row)| {
         let apart = |other: &&(f64, Part, usize)| other.1 == part && other.2.abs_diff(row) >= APART;
         let others = all_of.iter().filter(apart).map(|other| other.0);
         most - others.fold(0.0, f64::max)
     });
     Moves {
         best: best.map(|(_, part, row)| (part, row)),
-        sharpness,
+        lost_beside,
         tried: all_of.len(),
     }
 }
@@ -405,6 +405,6 @@ fn moved_from(
         measured: measured.collect(),
         fits: fits.to_vec(),
         parameters: 6.0,
-        sharpness: 0.0,
+        lost_beside: 0.0,
     }
 }
