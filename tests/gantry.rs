@@ -16,7 +16,15 @@ use serde_json::Value;
 const MARKER: f64 = 2e-4;
 
 /// Name, kind, origin, axis and range (m or rad) of each joint, from the base on.
-const JOINTS: [(&str, &str, &str, &str, [f64; 2]); 5] = [
+type Joint = (
+    &'static str,
+    &'static str,
+    &'static str,
+    &'static str,
+    [f64; 2],
+);
+
+const JOINTS: [Joint; 5] = [
     ("gx", "prismatic", "0 0 1.2", "1 0 0", [0.1, 1.4]),
     ("gy", "prismatic", "0 0 0", "0 1 0", [0.1, 0.9]),
     ("gz", "prismatic", "0 0 0", "0 0 -1", [0.1, 0.5]),
@@ -37,9 +45,21 @@ solve:
   limits: {held_out_rms_mm: 1}
 ";
 
+/// A SCARA: symmetric about the planes through its parallel axes, so that its mirror image is the arm with the quill reversed.
+const SCARA: [Joint; 4] = [
+    ("j1", "revolute", "0 0 0.3", "0 0 1", [-2.0, 2.0]),
+    ("j2", "revolute", "0.4 0 0", "0 0 1", [-2.2, 2.2]),
+    ("quill", "prismatic", "0.3 0 0", "0 0 -1", [0.02, 0.17]),
+    ("j4", "revolute", "0 0 -0.1", "0 0 1", [-2.9, 2.9]),
+];
+
 fn urdf() -> String {
+    urdf_of(&JOINTS)
+}
+
+fn urdf_of(joints: &[Joint]) -> String {
     let mut text = String::from("<robot name=\"gantry\">\n  <link name=\"l0\"/>\n");
-    for (i, (name, kind, xyz, axis, _)) in JOINTS.iter().enumerate() {
+    for (i, (name, kind, xyz, axis, _)) in joints.iter().enumerate() {
         let _ = writeln!(
             text,
             "  <link name=\"l{}\"/>\n  <joint name=\"{name}\" type=\"{kind}\">\n    <parent link=\"l{i}\"/>\n    <child link=\"l{}\"/>\n    \
@@ -60,24 +80,40 @@ struct Share {
 }
 
 fn recording(robot: &RobotModel, share: Option<Share>, n: usize, seed: u64) -> String {
+    recording_of(robot, &JOINTS, share, n, seed)
+}
+
+fn recording_of(
+    robot: &RobotModel,
+    joints: &[Joint],
+    share: Option<Share>,
+    n: usize,
+    seed: u64,
+) -> String {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let tracker_from_root = Isometry3::from_parts(
         Translation3::new(0.9, 0.3, 0.1),
         UnitQuaternion::from_euler_angles(0.02, -0.03, 0.7),
     );
     let tool = [[0.05, 0.0, 0.1], [0.12, 0.01, 0.06], [0.02, 0.08, 0.08]];
-    let mut text = String::from("gx_m,gy_m,gz_m,gc_rad,ga_rad");
+    let column = |(name, kind, ..): &Joint| match *kind {
+        "prismatic" => format!("{name}_m"),
+        _ => format!("{name}_rad"),
+    };
+    let mut text = joints.iter().map(column).collect::<Vec<_>>().join(",");
     for k in 1..=3 {
         let _ = write!(text, ",t{k}_x_mm,t{k}_y_mm,t{k}_z_mm");
     }
     text.push('\n');
-    let link = robot.link_id("l5").expect("there");
+    let tip = format!("l{}", joints.len());
+    let link = robot.link_id(&tip).expect("there");
     for _ in 0..n {
-        let q = JOINTS.map(|joint| rng.random_range(joint.4[0]..joint.4[1]));
+        let ranges = joints.iter().map(|joint| joint.4[0]..joint.4[1]);
+        let q: Vec<f64> = ranges.map(|range| rng.random_range(range)).collect();
         // Zeros that the fit finds.
-        let mut true_q = q.to_vec();
-        true_q[3] += 0.004;
-        true_q[4] -= 0.003;
+        let mut true_q = q.clone();
+        true_q[joints.len() - 2] += 0.004;
+        true_q[joints.len() - 1] -= 0.003;
         if let Some(Share { of, with, factor }) = share {
             true_q[of] += factor * q[with];
         }
@@ -285,4 +321,75 @@ fn a_gantry_whose_joints_are_called_x_y_and_z_is_read() {
     let dir = dir.file("corrected.csv", corrected);
     let ran = dir.calib(["predict", MODEL, "corrected.csv"]).expect(0);
     assert_eq!(rows(&ran.stdout).len(), rows(&own).len());
+}
+
+/// Sliding joints in meters beside a tracker in millimeters, without a unit in any name.
+#[test]
+fn init_finds_two_units_of_length_in_one_table() {
+    let mut dir = gantry(None, 5);
+    for file in ["gantry/poses.csv", "gantry/checks.csv"] {
+        let text = dir.read(file);
+        let (header, rows) = text.split_once('\n').expect("a header");
+        let bare = ["_mm", "_m", "_rad"].iter();
+        let bare = bare.fold(header.to_owned(), |header, unit| {
+            header
+                .replace(&format!("{unit},"), ",")
+                .trim_end_matches(unit)
+                .to_owned()
+        });
+        dir = dir.file(file, format!("{bare}\n{rows}"));
+    }
+    let files = [
+        "gantry/gantry.urdf",
+        "gantry/poses.csv",
+        "gantry/checks.csv",
+    ];
+    let call = [&["init"], files.as_slice(), &["--out", "it.yaml"]].concat();
+    let made = dir.calib_with(&call);
+    assert_eq!(made.code, 0, "{}{}", made.stdout, made.stderr);
+    dir.calib(["run", "it.yaml", "--out", "out"]).expect(0);
+    assert!(held_out(&dir.json("out/report.json")) < 1e-3);
+}
+
+/// The tracker is left-handed, and the quill reversed would explain it as well; its readings would leave the limits.
+#[test]
+fn init_reverses_no_joint_out_of_its_limits() {
+    let limits = "lower=\"-3\" upper=\"3\"";
+    let own = urdf_of(&SCARA);
+    let (before, quill) = own.split_once("name=\"quill\"").expect("there");
+    let quill = quill.replacen(limits, "lower=\"0\" upper=\"0.18\"", 1);
+    let urdf = format!("{before}name=\"quill\"{quill}");
+    let robot = RobotModel::from_urdf_text(&urdf, "true").expect("a robot");
+    let mirrored = |n: usize, seed: u64| {
+        let text = recording_of(&robot, &SCARA, None, n, seed);
+        let (header, rows) = text.split_once('\n').expect("a header");
+        let y: Vec<bool> = header.split(',').map(|c| c.ends_with("_y_mm")).collect();
+        let row = |row: &str| {
+            let cells = row.split(',').zip(&y);
+            let cells = cells.map(|(cell, y)| match (y, cell.strip_prefix('-')) {
+                (false, _) => cell.to_owned(),
+                (true, Some(without)) => without.to_owned(),
+                (true, None) => format!("-{cell}"),
+            });
+            cells.collect::<Vec<_>>().join(",")
+        };
+        let rows: Vec<String> = rows.lines().map(row).collect();
+        format!("{header}\n{}\n", rows.join("\n"))
+    };
+    let dir = Scratch::new()
+        .file("arm.urdf", urdf.clone())
+        .file("poses.csv", mirrored(40, 21))
+        .file("checks.csv", mirrored(12, 22));
+    let made = dir.calib([
+        "init",
+        "arm.urdf",
+        "poses.csv",
+        "checks.csv",
+        "--out",
+        "it.yaml",
+    ]);
+    let said = made.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(said.contains("frame is left-handed"), "{said}");
+    assert!(!dir.read("it.yaml").contains("reversed:"), "{said}");
+    assert_eq!(made.code, 3, "{said}");
 }

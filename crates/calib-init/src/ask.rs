@@ -235,7 +235,7 @@ pub fn next_correction(
 
 /// Whether readings that are within the URDF's limits stay there with joints counted the other way.
 fn stays_within_limits(scene: &Scene<'_>, correction: &Correction) -> bool {
-    /// Half a degree, or 9 mm: as the limits are checked.
+    /// rad or m, half a degree: readings at a limit may be beyond it by this, as where a profile is read.
     const TOLERANCE: f64 = 0.009;
     let stays = |joint: &Joint| {
         let Some((low, high)) = joint.limits.range() else {

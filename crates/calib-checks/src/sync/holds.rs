@@ -74,9 +74,15 @@ pub fn holds(poses: &Poses, settings: &HoldSettings) -> Vec<Hold> {
         joints.push((q.clone(), settings.joint_range));
     }
     let resting = quiet(t, &joints, settings.window);
-    let mut channels = tracked(poses, settings);
-    for (values, limit) in &mut channels {
-        *limit = limit.max(SPREAD * noise(values, &resting));
+    let mut channels: Vec<Channel> = Vec::new();
+    for mut group in tracked(poses, settings) {
+        // Of the noise of an angle, an entry of R shows more in one posture than in another: the noise of a group is its largest.
+        let noises = group.iter().map(|(values, _)| noise(values, &resting));
+        let seen = SPREAD * noises.fold(0.0, f64::max);
+        group
+            .iter_mut()
+            .for_each(|(_, limit)| *limit = limit.max(seen));
+        channels.extend(group);
     }
     channels.extend(joints);
     let quiet = quiet(t, &channels, settings.window);
@@ -107,7 +113,7 @@ pub fn holds(poses: &Poses, settings: &HoldSettings) -> Vec<Hold> {
 /// Values that must stand still, with the limit of their range.
 type Channel = (Vec<Option<f64>>, f64);
 
-/// The range of noise within a window, in units of its σ: twenty samples exceed it in one window of 10⁸.
+/// The range of noise within a window, in units of its σ: twenty samples exceed it in one window of 10⁷.
 const SPREAD: f64 = 9.0;
 
 /// Fewest second differences that tell a noise.
@@ -150,38 +156,31 @@ fn noise(values: &[Option<f64>], resting: &[bool]) -> f64 {
     crate::statistics::median(differences).unwrap_or(0.0) / (MIDDLE * 6f64.sqrt())
 }
 
-/// Every coordinate of markers and bodies, with its limit. A body's turn enters as rotation-vector components against
-/// its first orientation, which is exact enough within a window.
-fn tracked(poses: &Poses, settings: &HoldSettings) -> Vec<Channel> {
-    let mut channels: Vec<Channel> = Vec::new();
+/// The coordinates of every marker and body, and the entries of every body's R, each with its limit.
+fn tracked(poses: &Poses, settings: &HoldSettings) -> Vec<Vec<Channel>> {
+    let mut groups: Vec<Vec<Channel>> = Vec::new();
     for track in poses.markers.values() {
         // What stands still may be written as two neighboring multiples of the step.
         let limit = settings.point_range + step_of_points(track);
-        for axis in 0..3 {
-            channels.push((track.iter().map(|p| p.map(|p| p[axis])).collect(), limit));
-        }
+        let axis = |axis: usize| (track.iter().map(|p| p.map(|p| p[axis])).collect(), limit);
+        groups.push((0..3).map(axis).collect());
     }
     for track in poses.bodies.values() {
         let limit = settings.point_range + step_of_poses(track);
-        for axis in 0..3 {
-            channels.push((
-                track
-                    .iter()
-                    .map(|p| p.map(|p| p.translation.vector[axis]))
-                    .collect(),
-                limit,
-            ));
-        }
+        let axis = |axis: usize| {
+            let values = track.iter().map(|p| p.map(|p| p.translation.vector[axis]));
+            (values.collect(), limit)
+        };
+        groups.push((0..3).map(axis).collect());
         // The nine entries of R change by at most the angle.
-        for (row, column) in (0..3).flat_map(|r| (0..3).map(move |c| (r, c))) {
-            let entry = |p: &Isometry3<f64>| p.rotation.to_rotation_matrix()[(row, column)];
-            channels.push((
-                track.iter().map(|p| p.as_ref().map(entry)).collect(),
-                settings.turn_range,
-            ));
-        }
+        let entry = |at: usize| {
+            let of = |p: &Isometry3<f64>| p.rotation.to_rotation_matrix()[(at / 3, at % 3)];
+            let values = track.iter().map(|p| p.as_ref().map(of));
+            (values.collect(), settings.turn_range)
+        };
+        groups.push((0..9).map(entry).collect());
     }
-    channels
+    groups
 }
 
 fn step_of_points(track: &[Option<Point3<f64>>]) -> f64 {

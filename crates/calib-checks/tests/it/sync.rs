@@ -344,6 +344,29 @@ fn holds_are_found_and_averaged() {
     assert!(holds(&Poses::default(), &HoldSettings::default()).is_empty());
 }
 
+/// Noise of which twenty samples spread over more than the millimeter, or 0.6°, that a quiet tracker stays within: the joints tell that it is rest.
+#[test]
+fn holds_of_a_noisy_tracker_are_found_and_not_split() {
+    for [place, turn] in [[2e-4, 5e-4], [5e-4, 5e-4], [5e-5, 4e-3]] {
+        let mut rng = ChaCha8Rng::seed_from_u64(9);
+        let mut poses = stop_and_go(0.0);
+        for pose in poses.bodies.values_mut().flatten().flatten() {
+            *pose *= Isometry3::new(noise(&mut rng, place), noise(&mut rng, turn));
+        }
+        for point in poses.markers.values_mut().flatten().flatten() {
+            *point += noise(&mut rng, place);
+        }
+        let found = holds(&poses, &HoldSettings::default());
+        assert_eq!(found.len(), 5, "{place} {turn}: {found:?}");
+        for (k, hold) in found.iter().enumerate() {
+            let start = 2.5 * k as f64;
+            let (first, last) = hold.span;
+            assert!(first > start + 0.2 && last < start + 1.6, "{hold:?}");
+            assert!(last - first > 0.9, "{hold:?}");
+        }
+    }
+}
+
 /// As recorded live: only rows that stand still, so that nothing but the gap in time, or the column `hold`, tells one
 /// hold from the next.
 #[test]

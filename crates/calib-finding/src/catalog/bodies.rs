@@ -74,7 +74,7 @@ super::topic! {
             "Check the axes of the export: the recording's frame is left-handed, or an axis has the wrong sign.";
         "tracker": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} with one axis of the tracker reversed[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
-            "Check the axes of the export: the tracker's frame is left-handed, or an axis has the wrong sign.";
+            "Check the axes of the export: the tracker's frame is left-handed, or an axis has the wrong sign.[[ Or correct {equivalent:code}: before you choose, move one of these joints and compare its direction with the axis in the URDF.]]";
     }
     /// A marker moves on its body over all recordings together.
     BODY_NOT_RIGID = "body-not-rigid" {

@@ -34,7 +34,7 @@ super::topic! {
             "The points spread over {spread:m}, up to {farthest:m} from the tracker's origin.",
             "Check whether these are millimeters: name the columns `…_mm`. Columns without a unit in their name follow `columns: {lengths: mm}`.";
         "some_millimeters": Error,
-            "The places of {names} spread over {spread:m}, all others of the recording over {others}: they are in different units.",
+            "The positions of {names} spread over {spread:m}, all others of the recording over {others}: they are in different units.",
             "Check whether {names} are in millimeters: name their columns `…_mm`.";
         "meters": Error,
             "All points lie within {farthest} of the tracker's origin.",

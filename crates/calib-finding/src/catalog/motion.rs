@@ -43,8 +43,8 @@ super::topic! {
     /// A table with more rows than the tracker has frames.
     FRAMES_REPEATED = "frames-repeated" {
         "": Info,
-            "In {repeated} of {rows:row} values of {names} are those of the row before to the last digit while the robot moves, in up to {longest:row} one after the other: the file has more rows than the tracker had frames. Of each frame the first row was used.",
-            "Write a row for every frame of the tracker, with the joints' readings of that time, if you can: the time of a frame is known to a row only.";
+            "In {repeated} of {rows:row} the values of {names} are, to the last digit, those of the row before, while the robot moves. One frame stands in up to {longest:row}: the file has more rows than the tracker had frames. Of each frame only the first row was used.",
+            "Write a row for every frame of the tracker, with the joints' readings of that time, if you can: the time of a frame is known only to within a row.";
     }
     /// Validation rows that the fit uses as well.
     HELD_OUT_IN_TRAINING = "held-out-in-training" {

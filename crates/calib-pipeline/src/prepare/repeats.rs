@@ -14,7 +14,7 @@ use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::slides::scales;
 
 /// Joint values of a robot at rest stay within this, rad, or m where the robot is large: two steps of an encoder of 16 bits, 0.011°.
-const JITTER: f64 = 2e-4;
+pub(crate) const JITTER: f64 = 2e-4;
 /// Frames of a robot at rest agree to this, m. Where they do not, the joint values are not those of the rows.
 const AT_REST: f64 = 5e-3;
 /// Measured twice, a place differs by more than this, m: what is closer was copied and rounded.

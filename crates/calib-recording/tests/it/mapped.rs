@@ -25,6 +25,24 @@ fn options() -> WriteOptions {
     }
 }
 
+/// Joints that are called like coordinates stay joints beside a body that the map names.
+#[test]
+fn joints_x_y_and_z_beside_a_mapped_body_are_no_marker() {
+    let text = "x_mm,y_mm,z_mm,hx_mm,hy_mm,hz_mm,a_deg,b_deg,c_deg\n100,200,-50,1,2,3,10,20,30\n";
+    let body = r#"{"bodies": {"hand": {"position": ["hx_mm", "hy_mm", "hz_mm"], "fixed_xyz": ["a_deg", "b_deg", "c_deg"]}}, "angles": "deg"}"#;
+    let options = ReadOptions {
+        columns: Some(map(body)),
+        joints: ["x", "y", "z"].map(str::to_owned).to_vec(),
+        ..ReadOptions::default()
+    };
+    let read = read_bytes("t.csv", text.as_bytes(), &options);
+    let read = read.unwrap_or_else(|e| panic!("{e}"));
+    let read = read.poses(Filled::Exclude).expect("one table");
+    assert!(read.markers.is_empty(), "{:?}", read.markers);
+    let of = |joint: &str| read.joints[joint][0].expect("given");
+    assert_eq!([of("x"), of("y"), of("z")], [0.1, 0.2, -0.05]);
+}
+
 #[test]
 fn a_map_reads_back_what_was_written_for_it() {
     let poses = poses();
