@@ -1,4 +1,4 @@
-//! A gantry with a wrist: shares of a sliding joint's motion in that of a turning one, and the other way round.
+//! Robots with sliding joints: shares of a sliding joint's motion in that of a turning one and the other way round, and what the first profile makes of their tables.
 
 use crate::scratch;
 
@@ -51,6 +51,15 @@ const SCARA: [Joint; 4] = [
     ("j2", "revolute", "0.4 0 0", "0 0 1", [-2.2, 2.2]),
     ("quill", "prismatic", "0.3 0 0", "0 0 -1", [0.02, 0.17]),
     ("j4", "revolute", "0 0 -0.1", "0 0 1", [-2.9, 2.9]),
+];
+
+/// An arm on a lift.
+const LIFT: [Joint; 5] = [
+    ("lift", "prismatic", "0 0 0.4", "0 0 1", [0.05, 0.4]),
+    ("turn", "revolute", "0 0 0.3", "0 0 1", [-1.9, 1.9]),
+    ("tilt", "revolute", "0.1 0 0.2", "0 1 0", [-1.4, 0.7]),
+    ("elbow", "revolute", "0.4 0 0", "0 1 0", [-0.5, 1.9]),
+    ("roll", "revolute", "0.3 0 0", "1 0 0", [-1.7, 1.7]),
 ];
 
 fn urdf() -> String {
@@ -323,27 +332,22 @@ fn a_gantry_whose_joints_are_called_x_y_and_z_is_read() {
     assert_eq!(rows(&ran.stdout).len(), rows(&own).len());
 }
 
-/// Sliding joints in meters beside a tracker in millimeters, without a unit in any name.
+/// A sliding joint in meters beside a tracker in millimeters, without a unit in any name.
 #[test]
 fn init_finds_two_units_of_length_in_one_table() {
-    let mut dir = gantry(None, 5);
-    for file in ["gantry/poses.csv", "gantry/checks.csv"] {
-        let text = dir.read(file);
+    let robot = RobotModel::from_urdf_text(&urdf_of(&LIFT), "true").expect("a robot");
+    let bare = |n: usize, seed: u64| {
+        let text = recording_of(&robot, &LIFT, None, n, seed);
         let (header, rows) = text.split_once('\n').expect("a header");
-        let bare = ["_mm", "_m", "_rad"].iter();
-        let bare = bare.fold(header.to_owned(), |header, unit| {
-            header
-                .replace(&format!("{unit},"), ",")
-                .trim_end_matches(unit)
-                .to_owned()
-        });
-        dir = dir.file(file, format!("{bare}\n{rows}"));
-    }
-    let files = [
-        "gantry/gantry.urdf",
-        "gantry/poses.csv",
-        "gantry/checks.csv",
-    ];
+        let stem = |column: &str| column.rsplit_once('_').expect("a unit").0.to_owned();
+        let header: Vec<String> = header.split(',').map(stem).collect();
+        format!("{}\n{rows}", header.join(","))
+    };
+    let dir = Scratch::new()
+        .file("arm.urdf", urdf_of(&LIFT))
+        .file("poses.csv", bare(50, 21))
+        .file("checks.csv", bare(15, 22));
+    let files = ["arm.urdf", "poses.csv", "checks.csv"];
     let call = [&["init"], files.as_slice(), &["--out", "it.yaml"]].concat();
     let made = dir.calib_with(&call);
     assert_eq!(made.code, 0, "{}{}", made.stdout, made.stderr);
