@@ -366,19 +366,7 @@ fn init_reverses_no_joint_out_of_its_limits() {
     let robot = RobotModel::from_urdf_text(&urdf, "true").expect("a robot");
     let mirrored = |n: usize, seed: u64| {
         let text = recording_of(&robot, &SCARA, None, n, seed);
-        let (header, rows) = text.split_once('\n').expect("a header");
-        let y: Vec<bool> = header.split(',').map(|c| c.ends_with("_y_mm")).collect();
-        let row = |row: &str| {
-            let cells = row.split(',').zip(&y);
-            let cells = cells.map(|(cell, y)| match (y, cell.strip_prefix('-')) {
-                (false, _) => cell.to_owned(),
-                (true, Some(without)) => without.to_owned(),
-                (true, None) => format!("-{cell}"),
-            });
-            cells.collect::<Vec<_>>().join(",")
-        };
-        let rows: Vec<String> = rows.lines().map(row).collect();
-        format!("{header}\n{}\n", rows.join("\n"))
+        negated(&text, |column| column.ends_with("_y_mm"))
     };
     let dir = Scratch::new()
         .file("arm.urdf", urdf.clone())
@@ -396,4 +384,89 @@ fn init_reverses_no_joint_out_of_its_limits() {
     assert!(said.contains("frame is left-handed"), "{said}");
     assert!(!dir.read("it.yaml").contains("reversed:"), "{said}");
     assert_eq!(made.code, 3, "{said}");
+}
+
+/// A table with the cells of some columns negated.
+fn negated(text: &str, is: impl Fn(&str) -> bool) -> String {
+    let (header, rows) = text.split_once('\n').expect("a header");
+    let which: Vec<bool> = header.split(',').map(is).collect();
+    let row = |row: &str| {
+        let cells = row.split(',').zip(&which);
+        let cells = cells.map(|(cell, which)| match (which, cell.strip_prefix('-')) {
+            (false, _) => cell.to_owned(),
+            (true, Some(without)) => without.to_owned(),
+            (true, None) => format!("-{cell}"),
+        });
+        cells.collect::<Vec<_>>().join(",")
+    };
+    let rows: Vec<String> = rows.lines().map(row).collect();
+    format!("{header}\n{}\n", rows.join("\n"))
+}
+
+/// Without a limit that decides, the reversed quill and the left-handed tracker are both possible: nothing is corrected, and what decides it is said.
+#[test]
+fn init_does_not_choose_between_a_sign_and_a_left_handed_tracker() {
+    let robot = RobotModel::from_urdf_text(&urdf_of(&SCARA), "true").expect("a robot");
+    let good = |n, seed| recording_of(&robot, &SCARA, None, n, seed);
+    let of_tracker = |column: &str| column.ends_with("_y_mm");
+    let of_quill = |column: &str| column == "quill_m";
+    let wrong: [&dyn Fn(&str) -> bool; 2] = [&of_tracker, &of_quill];
+    for is in wrong {
+        let dir = Scratch::new()
+            .file("arm.urdf", urdf_of(&SCARA))
+            .file("poses.csv", negated(&good(40, 21), is))
+            .file("checks.csv", negated(&good(12, 22), is));
+        let files = ["arm.urdf", "poses.csv", "checks.csv"];
+        let made = dir.calib(["init", files[0], files[1], files[2], "--out", "it.yaml"]);
+        let said = made.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(said.contains("Nothing is corrected"), "{said}");
+        assert!(said.contains("frame is left-handed"), "{said}");
+        assert!(said.contains("write `reversed: [quill]`"), "{said}");
+        assert!(
+            !dir.read("it.yaml").contains("reversed: [quill]\n"),
+            "{said}"
+        );
+        assert_eq!(made.code, 3, "{said}");
+        // A run says the same of the remedy.
+        let said = dir.calib(["check", "it.yaml"]).expect(3).stdout;
+        let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(
+            said.contains("First rule out `mirrored(tracker)`"),
+            "{said}"
+        );
+    }
+}
+
+/// A rail with its own name beside an arm whose columns are only numbered.
+#[test]
+fn init_pairs_numbered_columns_beside_a_named_one() {
+    let robot = RobotModel::from_urdf_text(&urdf_of(&LIFT), "true").expect("a robot");
+    let numbered = |n: usize, seed: u64| {
+        let text = recording_of(&robot, &LIFT, None, n, seed);
+        (1..)
+            .zip(&LIFT[1..])
+            .fold(text, |text, (k, joint)| {
+                text.replacen(&format!("{}_rad", joint.0), &format!("q{k}"), 1)
+            })
+            .replacen("lift_m", "lift", 1)
+    };
+    let dir = Scratch::new()
+        .file("arm.urdf", urdf_of(&LIFT))
+        .file("poses.csv", numbered(50, 21))
+        .file("checks.csv", numbered(15, 22));
+    let files = ["arm.urdf", "poses.csv", "checks.csv"];
+    dir.calib(["init", files[0], files[1], files[2], "--out", "it.yaml"])
+        .expect(0);
+    let written = dir.read("it.yaml");
+    for (joint, column) in [
+        ("turn", "q1"),
+        ("tilt", "q2"),
+        ("elbow", "q3"),
+        ("roll", "q4"),
+    ] {
+        assert!(written.contains(&format!("{joint}: {column}")), "{written}");
+    }
+    let report = dir.calib(["run", "it.yaml", "--out", "out"]);
+    assert!(report.code < 2, "{}", report.stderr);
+    assert!(held_out(&dir.json("out/report.json")) < 1e-3);
 }

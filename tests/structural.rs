@@ -165,7 +165,7 @@ impl Setting {
 }
 
 /// Changes the cells of one column in some tables.
-fn column(dir: Scratch, tables: &[String], name: &str, change: impl Fn(f64) -> f64) -> Scratch {
+pub fn column(dir: Scratch, tables: &[String], name: &str, change: impl Fn(f64) -> f64) -> Scratch {
     tables.iter().fold(dir, |dir, table| {
         dir.cells(&format!("{table}.csv"), |_, column, cell| {
             match cell.parse::<f64>() {
@@ -237,7 +237,7 @@ pub fn coupled(dir: Scratch, tables: &[String], to: &str, from: &str, factor: f6
     })
 }
 
-fn findings(dir: &Scratch) -> Vec<Value> {
+pub fn findings(dir: &Scratch) -> Vec<Value> {
     let checked = dir.calib(["check", "arm.yaml", "--json"]);
     checked.json()["findings"]
         .as_array()
@@ -251,7 +251,7 @@ fn errors(found: &[Value]) -> Vec<&Value> {
 
 /// The only error is `id`, about `about` and with these recordings; no row is blamed.
 #[track_caller]
-fn named(dir: &Scratch, id: &str, about: &str, recordings: &[String]) -> Value {
+pub fn named(dir: &Scratch, id: &str, about: &str, recordings: &[String]) -> Value {
     let found = findings(dir);
     let wrong = errors(&found);
     assert_eq!(wrong.len(), 1, "{found:#?}");

@@ -57,6 +57,7 @@ mod shown;
 mod sizes;
 mod streams;
 mod structural;
+mod stuck;
 mod studies;
 mod sweeps;
 mod thermal;

@@ -1,10 +1,11 @@
 //! Links of all bodies and mistakes in the recordings, as facts, and the mistakes corrected.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_checks::structural::{
-    Chain, Correction, Decision, Hypothesis, Outcome, RecordingIndex, Scoped,
+    Chain, Correction, Decision, Hypothesis, JointIndex, Outcome, RecordingIndex, Scoped,
 };
+use calib_recording::Poses;
 use calib_urdf::{Joint, LinkId, RobotModel, doubt};
 
 use crate::correct;
@@ -207,9 +208,12 @@ pub fn next_correction(
     // Of corrections that the recordings do not distinguish, one that a column map can hold.
     let mut first = None;
     let is_of_tables = |c: &Correction| c.iter().any(|s| !is_of_links(&s.hypothesis));
-    // Readings that are within the URDF's limits as they are, and would not be: another explanation is the right one.
-    let within: Vec<bool> = all.iter().map(|c| stays_within_limits(scene, c)).collect();
+    // Readings that would be beyond the URDF's limits, where another explanation keeps them within: that one is the right one.
+    let within = within_limits(scene, &all);
     let some_are = within.iter().any(|w| *w);
+    let is_mirrored = |c: &Correction| c.iter().any(|s| s.hypothesis == Hypothesis::Mirrored);
+    let mut possible = all.iter().zip(&within).filter(|(_, w)| **w || !some_are);
+    let is_or_mirrored = possible.any(|(c, _)| is_mirrored(c));
     for (i, correction) in all.iter().enumerate() {
         let another = i > 0 && (!is_of_tables(correction) || correction.len() > 1);
         if another || (some_are && !within[i]) {
@@ -218,6 +222,18 @@ pub fn next_correction(
         let others = all.iter().enumerate().filter(|(k, _)| *k != i);
         let others = others.map(|(_, c)| context.in_words(c));
         let others: Vec<Vec<Mistake>> = others.chain(as_good.iter().cloned()).collect();
+        // Which of the two it is decides where the real robot moves: that is not ours to choose.
+        if is_or_mirrored && signs::is_of_signs(correction) {
+            next.facts.push(Fact::new(
+                Place::Recordings,
+                About::SignOrMirror {
+                    mistakes: context.in_words(correction),
+                    residuals,
+                    equivalent: others,
+                },
+            ));
+            return Ok(next);
+        }
         let evidence = (residuals, others.as_slice());
         let all = apply_each(model, sources, drafts, &bodies, correction, evidence)?;
         if all.complete {
@@ -233,29 +249,36 @@ pub fn next_correction(
     Ok(next)
 }
 
-/// Whether readings that are within the URDF's limits stay there with joints counted the other way.
-fn stays_within_limits(scene: &Scene<'_>, correction: &Correction) -> bool {
+/// For each correction: whether the readings of the joints that any of them reverses are within the URDF's limits after it.
+fn within_limits(scene: &Scene<'_>, all: &[&Correction]) -> Vec<bool> {
+    let reversed = |correction: &Correction| -> BTreeSet<JointIndex> {
+        let joints = correction.iter().filter_map(|s| match s.hypothesis {
+            Hypothesis::Sign { joint } => Some(joint),
+            _ => None,
+        });
+        joints.collect()
+    };
+    let any: BTreeSet<JointIndex> = all.iter().flat_map(|c| reversed(c)).collect();
+    let inside =
+        |joint: &JointIndex, sign: f64| is_within(scene, &scene.model.joints()[joint.0], sign);
+    let of = |correction: &&Correction| {
+        let reversed = reversed(correction);
+        any.iter()
+            .all(|j| inside(j, if reversed.contains(j) { -1.0 } else { 1.0 }))
+    };
+    all.iter().map(of).collect()
+}
+
+/// Whether all readings of a joint, times this sign, are within its limits.
+fn is_within(scene: &Scene<'_>, joint: &Joint, sign: f64) -> bool {
     /// rad or m, half a degree: readings at a limit may be beyond it by this, as where a profile is read.
     const TOLERANCE: f64 = 0.009;
-    let stays = |joint: &Joint| {
-        let Some((low, high)) = joint.limits.range() else {
-            return true;
-        };
-        let tables = scene.tables.iter();
-        let readings = || {
-            tables
-                .clone()
-                .filter_map(|t| t.joints.get(&joint.name))
-                .flatten()
-                .flatten()
-        };
-        let inside = |q: f64| (low - TOLERANCE..=high + TOLERANCE).contains(&q);
-        !readings().all(|q| inside(*q)) || readings().all(|q| inside(-q))
+    let Some((low, high)) = joint.limits.range() else {
+        return true;
     };
-    correction.iter().all(|scoped| match scoped.hypothesis {
-        Hypothesis::Sign { joint } => stays(&scene.model.joints()[joint.0]),
-        _ => true,
-    })
+    let of = |poses: &Poses| poses.joints.get(&joint.name).cloned().unwrap_or_default();
+    let mut readings = scene.tables.iter().flat_map(of).flatten();
+    readings.all(|q| (low - TOLERANCE..=high + TOLERANCE).contains(&(sign * q)))
 }
 
 /// What is said where no mistake is named.

@@ -2,13 +2,14 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use calib_checks::rigid_body::{body_poses, rigid_groups};
+use calib_checks::rigid_body::{BodyPoses, Distances, NotABody, body_poses, rigid_groups};
 use calib_recording::{BodyStream, Filled, MarkerStream};
 use calib_urdf::RobotModel;
 use nalgebra::Point3;
 
 use crate::error::InitError;
 use crate::fact::{About, Fact, Place};
+use crate::labels;
 use crate::source::Source;
 
 /// A body, before its link is known.
@@ -44,6 +45,7 @@ pub fn bodies(
     let mut tracks = tracks(sources);
     facts.extend(seldom(&mut tracks));
     facts.extend(duplicates(&mut tracks));
+    facts.extend(labels::in_tracks(&mut tracks));
     let names: Vec<&String> = tracks.keys().collect();
     let slices: Vec<&[Option<Point3<f64>>]> = tracks.values().map(Vec::as_slice).collect();
     // A tracked pose keeps its name.
@@ -65,11 +67,11 @@ pub fn bodies(
             About::Points {
                 markers: markers.len(),
             }
-        } else if let Ok(poses) = body_poses(&markers, &of_group, None, None) {
+        } else if let Ok(poses) = usual_poses(&markers, &of_group) {
             let sigma = poses.sigma.filter(|s| *s > CALCULATED);
             calculated |= poses.sigma.is_some_and(|s| s <= CALCULATED);
             let rows = poses.rows.iter().filter(|r| r.is_ok()).count();
-            if let Some(sigma) = sigma
+            if let Some(sigma) = sigma.filter(|s| *s < labels::LOOSE)
                 && noise.is_none_or(|(_, known)| rows > known)
             {
                 noise = Some((sigma, rows));
@@ -100,6 +102,19 @@ pub fn bodies(
     };
     facts.push(Fact::new(Place::Tracker, about));
     (found, facts)
+}
+
+/// The poses of a body by its usual samples: single wild ones are no noise.
+///
+/// # Errors
+/// As [`body_poses`].
+pub(crate) fn usual_poses(
+    names: &[String],
+    tracks: &[&[Option<Point3<f64>>]],
+) -> Result<BodyPoses, NotABody> {
+    let usual = Distances::of(tracks, None).without_gross(tracks);
+    let usual: Vec<&[Option<Point3<f64>>]> = usual.iter().map(Vec::as_slice).collect();
+    body_poses(names, &usual, None, None)
 }
 
 fn streams(sources: &[Source]) -> impl Iterator<Item = &BodyStream> {

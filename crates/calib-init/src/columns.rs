@@ -60,25 +60,28 @@ pub fn guess(model: &RobotModel, header: &Header) -> Guess {
 
 /// A column of time: named so, with numbers that never decrease.
 fn time(header: &Header, guess: &mut Guess, used: &mut BTreeSet<usize>) {
-    const NAMES: [&str; 7] = [
-        "t",
-        "time",
-        "timestamp",
-        "timestamps",
-        "stamp",
-        "ts",
-        "secs",
-    ];
-    let named = |i: &usize| {
-        let unit = name::unit(&header.names[*i]);
-        let is_time = !matches!(unit.unit, Some(NamedUnit::Angle(_) | NamedUnit::Length(_)));
-        is_time && NAMES.contains(&unit.stem.to_ascii_lowercase().as_str())
+    let rank = |i: usize| name::time(&header.names[i]);
+    // Seconds whose parts stand in a column of their own are too coarse to be one.
+    let parts = |i: &usize| {
+        let words = name::words(&header.names[*i]);
+        words
+            .iter()
+            .any(|w| name::PARTS_OF_SECONDS.contains(&w.as_str()))
+    };
+    let in_parts = (0..header.names.len()).any(|i| parts(&i));
+    let whole = |i: &usize| {
+        let t = || header.columns[*i].iter().flatten();
+        !(in_parts && t().all(|t| t.fract() == 0.0))
     };
     let rises = |i: &usize| {
         let t: Vec<f64> = header.columns[*i].iter().flatten().copied().collect();
         t.len() > 1 && t.windows(2).all(|pair| pair[1] >= pair[0]) && t[t.len() - 1] > t[0]
     };
-    let Some(i) = (0..header.names.len()).filter(named).find(rises) else {
+    let named = (0..header.names.len()).filter(|i| rank(*i).is_some() && !parts(i));
+    let Some(i) = named
+        .filter(|i| whole(i) && rises(i))
+        .min_by_key(|i| rank(*i))
+    else {
         return;
     };
     let stated = match name::unit(&header.names[i]).unit {
@@ -225,9 +228,18 @@ fn joints(model: &RobotModel, header: &Header, guess: &mut Guess, used: &mut BTr
         }
     }
     let by_name = found.len();
+    // A rail with its own name beside an arm whose columns are numbered.
+    let beside = match by_name {
+        1 => family(model, header, used, &found),
+        _ => None,
+    };
+    if let Some(family) = beside {
+        guess.by_order = true;
+        used.extend(family.values());
+        found.extend(family);
     // One column alone may have a joint's name by chance.
-    if by_name < 2
-        && let Some(family) = family(model, header, used)
+    } else if by_name < 2
+        && let Some(family) = family(model, header, used, &BTreeMap::new())
     {
         found.values().for_each(|i| {
             used.remove(i);
@@ -279,11 +291,12 @@ fn fits(model: &RobotModel, joint: JointId, column: &str) -> bool {
     }
 }
 
-/// Numbered columns for the joints of a chain, in their order from the root.
+/// Numbered columns for the joints of a chain, in their order from the root; for all joints of a chain but those that are `known`.
 fn family(
     model: &RobotModel,
     header: &Header,
     used: &BTreeSet<usize>,
+    known: &BTreeMap<JointId, usize>,
 ) -> Option<BTreeMap<JointId, usize>> {
     let mut families: BTreeMap<(String, String), Vec<(u32, usize)>> = BTreeMap::new();
     for i in (0..header.names.len()).filter(|i| !used.contains(i) && header.has_numbers(*i)) {
@@ -298,6 +311,11 @@ fn family(
     let chains: Vec<Vec<JointId>> = robot::tips(model)
         .into_iter()
         .map(|tip| tip.joints)
+        .filter(|joints| known.keys().all(|joint| joints.contains(joint)))
+        .map(|joints| {
+            let rest = joints.into_iter().filter(|j| !known.contains_key(j));
+            rest.collect()
+        })
         .collect();
     let consecutive = |of: &[(u32, usize)]| of.windows(2).all(|pair| pair[1].0 == pair[0].0 + 1);
     let mut best: Option<(bool, usize, BTreeMap<JointId, usize>)> = None;
@@ -313,7 +331,7 @@ fn family(
         let longer = || {
             chains
                 .iter()
-                .find(|chain| of_joints && chain.len() > members.len())
+                .find(|chain| known.is_empty() && of_joints && chain.len() > members.len())
         };
         let Some(chain) = chain.or_else(longer) else {
             continue;

@@ -88,7 +88,11 @@ pub fn recording<'r>(
     match &recording.usage {
         Use::Sweep(swept) => {
             push("use", flow("sweep"));
-            push("joints", Value::Flow(ranges(model, swept)));
+            let swept: Vec<_> = swept
+                .iter()
+                .map(|(j, r)| (*j, reachable(model, *j, *r)))
+                .collect();
+            push("joints", Value::Flow(ranges(model, &swept)));
         }
         Use::Static => push("use", flow("static")),
         Use::Validation => push("use", flow("validation")),
@@ -149,6 +153,15 @@ pub fn value(model: &RobotModel, joint: JointId, value: f64) -> String {
     match model.joint(joint).kind.turns() {
         true => yaml::number(value.to_degrees(), 1),
         false => yaml::number(value * 1e3, 1),
+    }
+}
+
+/// What of a range a joint can reach by the URDF: a profile that asks for more is refused, and the readings may be wrong.
+fn reachable(model: &RobotModel, joint: JointId, (low, high): (f64, f64)) -> (f64, f64) {
+    match model.joint(joint).limits.range() {
+        Some((lower, upper)) if low < upper && high > lower => (low.max(lower), high.min(upper)),
+        Some(all) => all,
+        None => (low, high),
     }
 }
 

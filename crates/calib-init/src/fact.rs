@@ -223,6 +223,13 @@ pub enum About {
         /// Standard deviation of one coordinate about the body, m; `None` where nothing tells it.
         sigma: Option<f64>,
     },
+    /// Labels of markers that were exchanged in single rows: a run puts them right by the distances.
+    LabelsExchanged {
+        /// The markers.
+        markers: Vec<String>,
+        /// Rows, of those that are looked at.
+        rows: usize,
+    },
     /// Markers of one body that do not span a frame: only two of them are used.
     Flat {
         /// Markers that are not used.
@@ -313,6 +320,16 @@ pub enum About {
         /// What it explains.
         residuals: Residuals,
         /// Corrections that the recordings do not distinguish from it.
+        equivalent: Vec<Vec<Mistake>>,
+    },
+    /// Joints that count the other way, or a left-handed tracker: a robot that is symmetric about a plane moves the same with either, so nothing is
+    /// corrected.
+    SignOrMirror {
+        /// The joints.
+        mistakes: Vec<Mistake>,
+        /// What either explains.
+        residuals: Residuals,
+        /// The left-handed tracker, and what else these recordings do not distinguish.
         equivalent: Vec<Vec<Mistake>>,
     },
     /// No mistake stands out: signs, order, units and links agree with the robot.

@@ -15,6 +15,7 @@ pub mod hold;
 mod instead;
 pub mod json;
 pub mod known;
+pub mod labels;
 pub mod limits;
 pub mod links;
 pub mod mistake;

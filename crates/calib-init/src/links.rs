@@ -332,7 +332,14 @@ impl Scene<'_> {
         if best.settled() {
             return best;
         }
-        let tips = self.recorded_tips();
+        // A joint that moved without a column, or with one that never changes, hides the links beyond it.
+        let mut tips = self.recorded_tips();
+        for tip in robot::tips(self.model) {
+            let link = robot::group(self.model, tip.link);
+            if !tips.contains(&link) {
+                tips.push(link);
+            }
+        }
         for (at, (body, _)) in own.iter().enumerate() {
             if stated.iter().any(|(b, _)| b == body) {
                 continue;

@@ -110,6 +110,54 @@ pub fn words(name: &str) -> Vec<String> {
     words
 }
 
+/// Words of a column with the parts of a second that another column has whole.
+pub const PARTS_OF_SECONDS: [&str; 6] = [
+    "nsec",
+    "nsecs",
+    "nanosec",
+    "nanosecs",
+    "nanoseconds",
+    "usec",
+];
+
+/// How well a name says that a column is the time of its row, best first: a word alone, the stamp of a message, a word among others.
+#[must_use]
+pub fn time(name: &str) -> Option<u8> {
+    const ALONE: [&str; 11] = [
+        "t",
+        "time",
+        "timestamp",
+        "timestamps",
+        "stamp",
+        "ts",
+        "sec",
+        "secs",
+        "zeit",
+        "zeitstempel",
+        "temps",
+    ];
+    const AMONG: [&str; 6] = [
+        "time",
+        "timestamp",
+        "timestamps",
+        "stamp",
+        "zeit",
+        "zeitstempel",
+    ];
+    let unit = unit(name);
+    if matches!(unit.unit, Some(NamedUnit::Angle(_) | NamedUnit::Length(_))) {
+        return None;
+    }
+    let words = words(unit.stem);
+    let all: Vec<&str> = words.iter().map(String::as_str).collect();
+    match all.as_slice() {
+        [word] if ALONE.contains(word) => Some(0),
+        ["header", "stamp", ..] => Some(1),
+        words if words.iter().any(|w| AMONG.contains(w)) => Some(2),
+        _ => None,
+    }
+}
+
 /// Words that say of a joint's column nothing but that it is one.
 const FILLERS: [&str; 14] = [
     "joint",
@@ -285,6 +333,24 @@ mod tests {
         assert_eq!(numbered("state.q[4]"), Some(("state.q[", 4, "]")));
         assert_eq!(numbered("elbow"), None);
         assert!(is_no_position("target_qd_3") && !is_no_position("actual_q_3"));
+    }
+
+    #[test]
+    fn times_are_known_by_their_words() {
+        for name in [
+            "t",
+            "%time",
+            "Zeit [s]",
+            "time_ms",
+            "rosbagTimestamp",
+            "header.stamp",
+        ] {
+            assert!(time(name).is_some(), "{name}");
+        }
+        for name in ["x", "t_mm", "estimate", "sometimes", "stampede"] {
+            assert_eq!(time(name), None, "{name}");
+        }
+        assert!(time("header.stamp") < time("rosbagTimestamp"));
     }
 
     #[test]

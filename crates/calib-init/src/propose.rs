@@ -285,7 +285,7 @@ fn with_recordings(
     proposal.recordings = recordings(&drafts, &sources);
     of_files.extend(tables::far_clocks(model, proposal, &mut drafts, &sources)?);
     proposal.recordings = recordings(&drafts, &sources);
-    let mut poses = tables::tables(model, proposal, &drafts, &sources)?;
+    let mut poses = tables::tables(model, proposal, &drafts, &sources, &found)?;
     let asks = stated.is_none() && fixed.len() < found.len();
     if asks && poses.iter().all(|p| session::moved(model, p).is_empty()) {
         return Err(InitError::NoMotion {
@@ -307,7 +307,7 @@ fn with_recordings(
             sources = new;
             (found, of_bodies, fixed) = all_bodies(model, &sources, known);
             proposal.recordings = recordings(&drafts, &sources);
-            poses = tables::tables(model, proposal, &drafts, &sources)?;
+            poses = tables::tables(model, proposal, &drafts, &sources, &found)?;
         }
     }
     let scene = Scene {
@@ -339,7 +339,7 @@ fn with_recordings(
         };
         sources = new;
         proposal.recordings = recordings(&drafts, &sources);
-        poses = tables::tables(model, proposal, &drafts, &sources)?;
+        poses = tables::tables(model, proposal, &drafts, &sources, &found)?;
     }
     corrected::without_guesses(&mut of_files, &mut corrections);
     without_a_word(model, &proposal.bodies, &fixed, &mut of_links);

@@ -15,8 +15,10 @@ use calib_profile::Timing;
 use calib_recording::{Filled, Poses, Recording};
 use calib_urdf::RobotModel;
 
+use crate::bodies::Found;
 use crate::error::InitError;
 use crate::fact::{About, Fact, Place};
+use crate::labels;
 use crate::proposal::Proposal;
 use crate::session::Draft;
 use crate::source::Source;
@@ -64,7 +66,7 @@ fn recording_of(draft: &Draft, sources: &[Source]) -> Result<Recording, InitErro
     }
 }
 
-/// One table for each recording.
+/// One table for each recording, with the labels of these bodies put right.
 ///
 /// # Errors
 /// [`InitError::Pipeline`] where clocks cannot be brought together, or a file has streams of several clocks.
@@ -73,6 +75,7 @@ pub fn tables(
     proposal: &Proposal,
     drafts: &[Draft],
     sources: &[Source],
+    found: &[Found],
 ) -> Result<Vec<Poses>, InitError> {
     let robot = robot_profile(model, proposal)?;
     let of = |draft: &Draft| -> Result<Poses, InitError> {
@@ -90,7 +93,9 @@ pub fn tables(
             Some(timing) => Ok(align(&robot, &draft.name, spec, timing, &recording)?.poses),
         }
     };
-    drafts.iter().map(of).collect()
+    let mut tables: Vec<Poses> = drafts.iter().map(of).collect::<Result<_, _>>()?;
+    labels::in_tables(&mut tables, found);
+    Ok(tables)
 }
 
 /// Looks for the offset of clocks that are further apart than a profile looks for by itself, and notes for each such draft how far to look.

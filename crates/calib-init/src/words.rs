@@ -2,14 +2,15 @@
 
 mod joints;
 mod known;
+mod mistakes;
 
 pub use known::{next_of_absent, to_check, wrote};
 
 use calib_finding::{Unit, number, shell_path};
 use calib_recording::{AngleUnit, TimeUnit};
 
-use crate::fact::{About, AngleHow, LengthHow, Residuals, Rival};
-use crate::mistake::Mistake;
+use crate::fact::{About, AngleHow, LengthHow, Rival};
+use crate::labels::LOOSE;
 use crate::yaml;
 
 /// The first lines of a profile.
@@ -91,21 +92,9 @@ pub fn sentence(about: &About) -> String {
         | About::Lengths { .. }
         | About::Time { .. }
         | About::Ignored { .. } => of_columns(about),
-        About::Corrected {
-            mistake,
-            residuals,
-            equivalent,
-        } => corrected(mistake, residuals, equivalent),
-        About::NotCorrected {
-            mistake,
-            residuals,
-            equivalent,
-        } => format!(
-            "{} It explains the recordings ({}), but no profile corrects it: correct the table, or see what `calib check` says.{}",
-            found(mistake),
-            improvement(residuals),
-            not_distinguished(equivalent)
-        ),
+        About::Corrected { .. } | About::NotCorrected { .. } | About::SignOrMirror { .. } => {
+            mistakes::sentence(about)
+        }
         About::Agrees {
             rms,
             rows,
@@ -293,8 +282,16 @@ fn of_session(about: &About) -> String {
         }
         About::Rigid { markers, sigma } => {
             let to = sigma.map_or_else(String::new, |s| format!(" to {} per coordinate", mm(s)));
-            format!("{markers} markers keep their distances{to}: one body.")
+            match sigma {
+                Some(sigma) if *sigma >= LOOSE => format!("{markers} markers keep their distances{to} only, more than a tracker's noise: a marker is loose, labels are exchanged, or these are no one body."),
+                _ => format!("{markers} markers keep their distances{to}: one body."),
+            }
         }
+        About::LabelsExchanged { markers, rows } => format!(
+            "The labels of {} are exchanged in {}: a run puts them right by the distances.",
+            quoted(markers),
+            plural(*rows, "row", "rows")
+        ),
         About::Flat { left_out } => format!(
             "These markers keep their distances but lie on a line or at one point, so they give no orientation. Left out: {}.",
             quoted(left_out)
@@ -363,105 +360,6 @@ fn of_session(about: &About) -> String {
         About::Invented => "Mounts, errors and noise of the simulation are invented: put in what you expect. `calib simulate` writes these recordings, `calib plan` proposes better ones.".to_owned(),
         _ => String::new(),
     }
-}
-
-/// What is wrong, as a sentence.
-fn found(mistake: &Mistake) -> String {
-    match mistake {
-        Mistake::Sign { joint } => format!("Joint `{joint}` counts against the axis of the URDF."),
-        Mistake::Exchange { first, second } => {
-            format!("The columns of `{first}` and `{second}` are exchanged.")
-        }
-        Mistake::Unit {
-            joint: Some(joint),
-            unit,
-        } => format!("The column of `{joint}` is in {unit}."),
-        Mistake::Unit { joint: None, unit } => format!("The joint columns are in {unit}."),
-        Mistake::TrackerUnit { unit } => {
-            format!("The tracker's lengths are in {}.", length_unit(unit))
-        }
-        Mistake::Offset { joint, degrees } => format!(
-            "The zero of `{joint}` is off: {} must be added.",
-            number::plain(degrees.to_radians(), Unit::Radian)
-        ),
-        Mistake::Rows { rows } => format!(
-            "Joint values and tracker rows are paired {} off.",
-            plural(rows.unsigned_abs().into(), "row", "rows")
-        ),
-        Mistake::Mirrored => "The tracker's frame is left-handed.".to_owned(),
-        Mistake::TrackerMoved => {
-            "The tracker moved, or its axes changed, between recordings.".to_owned()
-        }
-        Mistake::Remounted { body } => {
-            format!("`{body}` moved on its link between recordings.")
-        }
-        Mistake::Poses => "The convention of the tracked poses was misread.".to_owned(),
-        Mistake::MissingColumn { joint } => {
-            format!("Joint `{joint}` moved, and no column has its readings.")
-        }
-        Mistake::StoodAt {
-            joint,
-            value,
-            turns,
-        } => {
-            let unit = if *turns { Unit::Radian } else { Unit::Meter };
-            format!(
-                "Joint `{joint}` stood at {}; no column says so.",
-                number::plain(*value, unit)
-            )
-        }
-        Mistake::Link { body, link } => format!("`{body}` is on `{link}`."),
-        Mistake::Bodies { first, second } => {
-            format!("`{first}` and `{second}` are exchanged.")
-        }
-        Mistake::Other => "A mistake in the recordings stands out.".to_owned(),
-    }
-}
-
-fn improvement(residuals: &Residuals) -> String {
-    let next = residuals.next.map_or_else(String::new, |next| {
-        format!(", the next best explanation leaves {}", mm(next))
-    });
-    format!(
-        "{} rms without, {} with it{next}",
-        mm(residuals.none),
-        mm(residuals.best)
-    )
-}
-
-/// The corrections that explain the recordings as well.
-fn not_distinguished(equivalent: &[Vec<Mistake>]) -> String {
-    const MOST: usize = 3;
-    let mut others: Vec<String> = equivalent
-        .iter()
-        .take(MOST)
-        .map(|all| all.iter().map(found).collect::<Vec<_>>().join(" "))
-        .collect();
-    if equivalent.len() > MOST {
-        others.push(format!("{} more.", equivalent.len() - MOST));
-    }
-    match others.is_empty() {
-        true => String::new(),
-        false => format!(
-            " These recordings do not distinguish it from: {}",
-            others.join(" Or: ")
-        ),
-    }
-}
-
-fn corrected(mistake: &Mistake, residuals: &Residuals, equivalent: &[Vec<Mistake>]) -> String {
-    let others = not_distinguished(equivalent);
-    let doubt = residuals.over.map_or_else(String::new, |limit| {
-        format!(
-            " This is not certain: errors of 1° and 10 mm explain {} only, so that another mistake may be behind it.",
-            mm(limit)
-        )
-    });
-    format!(
-        "{} Corrected here ({}).{doubt}{others}",
-        found(mistake),
-        improvement(residuals)
-    )
 }
 
 /// What to do next.

@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::chain::Motion;
-use super::correct::same_shape;
+use super::correct::{same_shape, stuck_at};
 use super::data::{Body, Data, Measured};
 use super::hypothesis::{
     Direction, Hypothesis, PoseMistake, QuarterTurns, Scope, TRACKER_UNITS, UnitMistake,
@@ -222,13 +222,23 @@ fn of_tracker(data: &Data, everywhere: &[Scope], parts: &[Scope], list: &mut Vec
     }
 }
 
-/// Joints that never moved by their readings, and may have stood elsewhere.
+/// Joints that never moved by their readings, in all recordings or in one of a few, and may have stood elsewhere or moved.
 pub(crate) fn of_still(data: &Data) -> Vec<Candidate> {
-    let still = data.never_moved().into_iter();
-    let still = still.filter(|joint| data.chain.turns(joint.0).is_some());
-    still
-        .map(|joint| (Hypothesis::MissingColumn { joint }, vec![Scope::All]))
-        .collect()
+    let present = recordings_present(data);
+    let few = present.len() <= MOST_RECORDINGS_EXCEPT;
+    let parts: Vec<Scope> = present.into_iter().map(Scope::Recording).collect();
+    let joints = data.relevant_joints().into_iter();
+    let still = joints.filter(|joint| data.chain.turns(joint.0).is_some());
+    let of = |joint: JointIndex| {
+        let stuck = |scope: &Scope| stuck_at(*scope, joint, data).is_some();
+        let scopes: Vec<Scope> = match stuck(&Scope::All) {
+            true => vec![Scope::All],
+            false if few => parts.iter().copied().filter(stuck).collect(),
+            false => Vec::new(),
+        };
+        (!scopes.is_empty()).then_some((Hypothesis::MissingColumn { joint }, scopes))
+    };
+    still.filter_map(of).collect()
 }
 
 /// Axes of joints along other coordinates than the model has them: a URDF has `1 0 0` where none is written. A reversed axis is the sign of the joint; only

@@ -54,6 +54,27 @@ pub(crate) fn correct(scoped: &Scoped, data: &Data) -> Data {
     corrected
 }
 
+/// Rows in the scope that do not say where the joint was: those without a reading of it, or all where its readings there never change.
+pub(crate) fn open_rows(scope: Scope, joint: JointIndex, data: &Data) -> Vec<usize> {
+    let empty = empty_rows(scope, joint, data);
+    if !empty.is_empty() || stuck_at(scope, joint, data).is_none() {
+        return empty;
+    }
+    let rows = 0..data.readings.len();
+    rows.filter(|&i| scope.contains(data.recording[i]))
+        .collect()
+}
+
+/// The reading of a joint that is the same in every row of the scope; `None` where there is none.
+pub(crate) fn stuck_at(scope: Scope, joint: JointIndex, data: &Data) -> Option<f64> {
+    let rows = data.readings.iter().zip(&data.recording);
+    let mut inside = rows
+        .filter(|(_, r)| scope.contains(**r))
+        .map(|(row, _)| row[joint.0]);
+    let first = inside.next()?;
+    inside.all(|reading| reading == first).then_some(first)?
+}
+
 /// Rows in the scope without a reading of the joint.
 pub(crate) fn empty_rows(scope: Scope, joint: JointIndex, data: &Data) -> Vec<usize> {
     let rows = 0..data.readings.len();

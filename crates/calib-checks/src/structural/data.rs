@@ -153,17 +153,6 @@ impl Data {
         missing
     }
 
-    /// The joints above a body whose readings are the same in every row: where they stood is said by one number.
-    #[must_use]
-    pub fn never_moved(&self) -> Vec<JointIndex> {
-        let same = |joint: &JointIndex| {
-            let mut readings = self.readings.iter().map(|row| row[joint.0]);
-            let first = readings.next().flatten();
-            first.is_some() && readings.all(|reading| reading == first)
-        };
-        self.relevant_joints().into_iter().filter(same).collect()
-    }
-
     /// The joints whose readings move a body.
     #[must_use]
     pub fn relevant_joints(&self) -> Vec<JointIndex> {

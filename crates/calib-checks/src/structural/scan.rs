@@ -28,6 +28,16 @@ pub(crate) struct Scored {
     pub score: Score,
 }
 
+impl Scored {
+    /// What is left, m, as it stands beside what others leave: another unit of length would make any residual small.
+    pub fn left(&self) -> f64 {
+        match self.scoped.hypothesis {
+            Hypothesis::TrackerUnit { .. } => self.score.score,
+            _ => self.score.rms,
+        }
+    }
+}
+
 /// The data laid out for scoring: sums of the uncorrected data per recording, and what a hypothesis needs to change them.
 pub(crate) struct Scan<'a> {
     pub data: &'a Data,

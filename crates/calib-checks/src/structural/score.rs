@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use super::candidates::Candidate;
-use super::correct::{correct, empty_rows};
+use super::correct::{correct, empty_rows, open_rows, stuck_at};
 use super::data::Data;
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::JointIndex;
@@ -57,7 +57,7 @@ fn estimated(scan: &Scan<'_>, hypothesis: &Hypothesis, scope: Scope) -> Scored {
     if let Hypothesis::MissingColumn { joint } = *hypothesis
         && empty_rows(scope, joint, scan.data).is_empty()
     {
-        return stood_elsewhere(scan, scoped, joint);
+        return stuck_column(scan, scoped, joint);
     }
     let corrected = special::apply(&scoped, scan.data);
     match *hypothesis {
@@ -72,7 +72,7 @@ fn estimated(scan: &Scan<'_>, hypothesis: &Hypothesis, scope: Scope) -> Scored {
 /// A joint without a column moved, or it stood still elsewhere than at 0. A reading of its own in every row takes up nominal
 /// errors, as a frame of its own does: where the joint hardly moved it must gain as much.
 fn empty_column(scan: &Scan<'_>, scoped: Scoped, joint: JointIndex, filled: &Data) -> Scored {
-    let rows = empty_rows(scoped.scope, joint, scan.data).len();
+    let rows = open_rows(scoped.scope, joint, scan.data).len();
     let mut score = penalized(scan, rows, scan.fit_corrected(filled).score);
     let Some(found) = special::whereabouts(scoped.scope, joint, scan.data, filled) else {
         return Scored { scoped, score };
@@ -89,11 +89,30 @@ fn empty_column(scan: &Scan<'_>, scoped: Scoped, joint: JointIndex, filled: &Dat
     Scored { scoped, score }
 }
 
+/// A joint whose readings never change stood elsewhere than they say, or moved in spite of them.
+fn stuck_column(scan: &Scan<'_>, scoped: Scoped, joint: JointIndex) -> Scored {
+    let stood = stood_elsewhere(scan, scoped, joint);
+    let corrected = special::apply(&scoped, scan.data);
+    let rows = open_rows(scoped.scope, joint, scan.data).len();
+    let mut score = penalized(scan, rows, scan.fit_corrected(&corrected).score);
+    let turns = scan.data.chain.turns(joint.0) != Some(false);
+    let found = special::whereabouts(scoped.scope, joint, scan.data, &corrected);
+    if found.is_none_or(|found| found.spread < still(turns)) {
+        return stood;
+    }
+    // Most joints whose readings never change do stand still.
+    score.score *= OWN_FRAME;
+    match SIMPLER * score.score < stood.score.score {
+        true => Scored { scoped, score },
+        false => stood,
+    }
+}
+
 /// A joint whose readings never change stood elsewhere than they say; no explanation where it stood there. One place for all rows
 /// takes up errors of the robot, as a frame of its own does: it must gain as much.
 fn stood_elsewhere(scan: &Scan<'_>, scoped: Scoped, joint: JointIndex) -> Scored {
     let (mut stood, value) = stood_at(scan, scoped, joint, 0.0);
-    let read = scan.data.readings.first().and_then(|row| row[joint.0]);
+    let read = stuck_at(scoped.scope, joint, scan.data);
     let turns = scan.data.chain.turns(joint.0) != Some(false);
     if read.is_none_or(|read| (value - read).abs() < at_zero(turns)) {
         stood.score.score = f64::INFINITY;

@@ -5,7 +5,7 @@ use calib_geometry::so3;
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector3};
 
 use super::chain::{Motion, Walk};
-use super::correct::empty_rows;
+use super::correct::open_rows;
 use super::data::{Data, Measured};
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{JointIndex, LinkIndex, SampleIndex};
@@ -13,8 +13,14 @@ use super::scan::{Fit, Scan};
 
 /// Alternations between registration and the estimated part; the residual falls by half or more in each.
 const ALTERNATIONS: usize = 12;
+/// The same for the readings of a joint: where few other joints move a body, the registration gives way slowly.
+const OF_READINGS: usize = 60;
 /// Relative fall of the residual below which alternating ends.
 const SETTLED: f64 = 1e-3;
+/// Readings that leave less than this part of the residual explain it: no other start is tried.
+const EXPLAINED: f64 = 0.2;
+/// Root mean square of the readings of a start, in half ranges.
+const START: f64 = 0.2;
 /// Starts per row for an empty column: 30° apart, less than half the width of a basin.
 const STARTS: usize = 12;
 /// Half the stroke (m) in which the one place of a prismatic joint is looked for.
@@ -188,7 +194,7 @@ pub(crate) fn whereabouts(
         true => (a - b).sin().atan2((a - b).cos()).abs(),
         false => (a - b).abs(),
     };
-    let rows = empty_rows(scope, joint, data).into_iter();
+    let rows = open_rows(scope, joint, data).into_iter();
     let found: Vec<f64> = rows.filter_map(|i| filled.readings[i][joint.0]).collect();
     let median = |from: f64| -> f64 {
         let mut distances: Vec<f64> = found.iter().map(|q| apart(*q, from)).collect();
@@ -209,11 +215,63 @@ pub(crate) fn range(data: &Data, joint: JointIndex) -> f64 {
 }
 
 fn missing_column(scope: Scope, joint: JointIndex, data: &Data) -> Data {
-    let rows = empty_rows(scope, joint, data);
-    let mut filled = data.clone();
-    rows.iter()
-        .for_each(|&i| filled.readings[i][joint.0] = Some(0.0));
-    estimated(filled, joint, &rows, &[]).0
+    let rows = open_rows(scope, joint, data);
+    let start = |values: &dyn Fn(usize) -> f64| {
+        let mut filled = data.clone();
+        rows.iter()
+            .for_each(|&i| filled.readings[i][joint.0] = Some(values(i)));
+        filled
+    };
+    let still = start(&|_| 0.0);
+    let before = Scan::new(&still, &[]).none().rms;
+    let (mut best, mut least) = estimated(still.clone(), joint, &rows, &[]);
+    if least < EXPLAINED * before {
+        return best;
+    }
+    // Where few other joints move a body, the registration of a joint at rest holds it there.
+    let motion = common_motion(&still);
+    let scale = START * range(data, joint);
+    for sign in [scale, -scale] {
+        let (filled, rms) = estimated(start(&|i| sign * motion[i]), joint, &rows, &[]);
+        if rms < least {
+            (best, least) = (filled, rms);
+        }
+    }
+    best
+}
+
+/// What the residuals of all rows have in common, row by row: the direction that they spread along most, with a mean square of 1.
+fn common_motion(data: &Data) -> Vec<f64> {
+    const ROUNDS: usize = 50;
+    let scan = Scan::new(data, &[]);
+    let fit = scan.fit(None);
+    let n = scan.channels.len();
+    let rows = data.readings.len();
+    let residual = |i: usize, k: usize| match scan.weights[i * n + k] > 0.0 {
+        true => scan.seen(&fit, i, k) - scan.predicted(&fit, i, k).0,
+        false => Vector3::zeros(),
+    };
+    let all: Vec<Vector3<f64>> = (0..rows * n).map(|at| residual(at / n, at % n)).collect();
+    // Any start does that is not across the direction.
+    let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+    let mut motion: Vec<f64> = (1..=rows)
+        .map(|i| (golden * i as f64).fract() - 0.5)
+        .collect();
+    for _ in 0..ROUNDS {
+        let mut across = vec![Vector3::zeros(); n];
+        for (at, r) in all.iter().enumerate() {
+            across[at % n] += r * motion[at / n];
+        }
+        let along = |i: usize| -> f64 { (0..n).map(|k| all[i * n + k].dot(&across[k])).sum() };
+        motion = (0..rows).map(along).collect();
+        let mean = motion.iter().map(|m| m * m).sum::<f64>() / rows.max(1) as f64;
+        if mean <= 0.0 {
+            return vec![0.0; rows];
+        }
+        let scale = mean.sqrt().recip();
+        motion.iter_mut().for_each(|m| *m *= scale);
+    }
+    motion
 }
 
 /// The data with the position of a joint in these rows taken from the tracker, beginning at the registration of the rows that are
@@ -250,7 +308,7 @@ pub(super) fn estimated(
     let mut walk = Walk::new(&filled.chain, &links);
     let range = range(&filled, joint);
     let mut last = f64::INFINITY;
-    for _ in 0..ALTERNATIONS {
+    for _ in 0..OF_READINGS {
         let found: Vec<f64> = {
             let scan = Scan::new(&filled, screened);
             let fit = scan.fit(None);

@@ -5,7 +5,7 @@ super::topic! {
     JOINT_SIGN = "joint-sign" {
         "": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} with the opposite sign of joint `{joint}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
-            "Negate this joint's column in the profile: `columns: {joints: {{joint}: <column>}, reversed: [{joint}]}`, or reverse its axis in the URDF: `<axis xyz=\"{axis}\"/>`.";
+            "Negate this joint's column in the profile: `columns: {joints: {{joint}: <column>}, reversed: [{joint}]}`, or reverse its axis in the URDF: `<axis xyz=\"{axis}\"/>`.[[ First rule out {equivalent:code}: only if joint `{joint}`, moved by a positive amount, moves against its axis in the URDF is its sign wrong.]]";
     }
     /// A joint moves along another axis than the URDF has.
     JOINT_AXIS = "joint-axis" {
@@ -54,6 +54,9 @@ super::topic! {
         "moved": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} if joint `{joint}`, which has no column, moved[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Record this joint: export its column. If it stood still, state where: `hold: {{joint}_{unit}: 0}` in the recording.";
+        "stuck": Error,
+            "The recordings fit the nominal robot to {none} rms, but to {best} if joint `{joint}`, whose readings never change, moved[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "Export the column of this joint again, or map another one to it: the one that is read does not follow it. Where a recording has no column for it, `hold` in the profile says that it stood still, and it did not.";
         "stood": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} if joint `{joint}`, which has no column, stood at {at} {unit}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Record this joint, or state the position that the controller showed for it, about {at} {unit}: `hold: {{joint}_{unit}: {at}}` in the recording.";

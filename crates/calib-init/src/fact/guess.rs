@@ -1,6 +1,7 @@
 //! Which facts a person must look at.
 
 use super::{About, CERTAIN};
+use crate::labels::LOOSE;
 
 /// How many times larger or smaller than stated the noise must be before that is one to look at.
 const OTHER_NOISE: f64 = 1.5;
@@ -30,6 +31,7 @@ pub(super) fn is_guess(about: &About) -> bool {
         About::Link {
             rms, next, same, ..
         } if !same.is_empty() || next.as_ref().is_some_and(|n| n.rms < CERTAIN * rms) => true,
+        About::Rigid { sigma, .. } => sigma.is_some_and(|s| s >= LOOSE),
         About::Time { named, .. } => !named,
         About::Log { named, rows, .. } => !named || rows.is_some(),
         About::TipOfChain { .. }
@@ -46,6 +48,7 @@ pub(super) fn is_guess(about: &About) -> bool {
         | About::ValidationSmallest { .. }
         | About::Corrected { .. }
         | About::NotCorrected { .. }
+        | About::SignOrMirror { .. }
         | About::TooLarge { .. }
         | About::Absent { .. }
         | About::Replaced { .. }

@@ -158,7 +158,7 @@ fn clocks_far_apart_are_brought_together_and_the_profile_says_how_far() {
     let (drafts, _) = session::drafts(&arm(), &sources, &Others::default()).expect("recordings");
     let mut without = proposed(&given);
     without.recordings[0].max_offset = None;
-    let error = tables::tables(&arm(), &without, &drafts, &sources).expect_err("too far");
+    let error = tables::tables(&arm(), &without, &drafts, &sources, &[]).expect_err("too far");
     let said = error.to_string();
     assert!(
         said.contains("offsets of up to 10 s are looked for"),

@@ -2,6 +2,7 @@
 
 mod designs;
 mod edit;
+mod faulty;
 mod hidden;
 mod lab;
 mod refused;

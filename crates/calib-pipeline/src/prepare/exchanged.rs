@@ -12,7 +12,6 @@ use calib_profile::BodyKind;
 use nalgebra::Point3;
 
 use crate::prepare::inputs::{Inputs, Loaded};
-use crate::prepare::scatter::scatter;
 
 /// Change of a distance, m, from which on a body is not the one that it is called.
 const ANOTHER: f64 = 5e-3;
@@ -37,12 +36,6 @@ pub(super) fn between_bodies(inputs: &mut Inputs) -> Vec<Finding> {
         for second in &bodies[a + 1..] {
             let recordings = &mut inputs.recordings;
             findings.extend(of_bodies(recordings, [first, second]));
-        }
-    }
-    let robot = &inputs.robot;
-    for name in findings.iter().flat_map(|f| &f.subject.recordings) {
-        if let Some(loaded) = inputs.recordings.get_mut(name) {
-            loaded.scatter = scatter(&robot.profile, &robot.model, &loaded.poses);
         }
     }
     findings

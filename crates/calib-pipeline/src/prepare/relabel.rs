@@ -15,6 +15,7 @@ use nalgebra::Point3;
 
 use crate::prepare::exchanged::between_bodies;
 use crate::prepare::inputs::{Inputs, Loaded};
+use crate::prepare::scatter::scatter;
 
 /// Distances stay within this many σ: one Gaussian value in 10¹⁵ does not.
 const SIGMAS: f64 = 8.0;
@@ -47,6 +48,13 @@ pub fn relabel(inputs: &mut Inputs) -> Vec<Finding> {
             stated,
         ));
     }
+    // The scatter of markers under wrong labels is not that of the tracker.
+    let robot = &inputs.robot;
+    for name in findings.iter().flat_map(|f| &f.subject.recordings) {
+        if let Some(loaded) = inputs.recordings.get_mut(name) {
+            loaded.scatter = scatter(&robot.profile, &robot.model, &loaded.poses);
+        }
+    }
     findings
 }
 
@@ -56,15 +64,54 @@ fn relabel_body(
     markers: &[String],
     stated: Option<f64>,
 ) -> Vec<Finding> {
-    let rows: Vec<(String, usize)> = recordings
+    let names: Vec<String> = recordings.keys().cloned().collect();
+    let mut tables: Vec<&mut Tracks> = recordings
+        .values_mut()
+        .map(|loaded| &mut loaded.poses.markers)
+        .collect();
+    let relabeled = put_right(&mut tables, markers, stated);
+    // Recording → rows with the markers that were exchanged.
+    let mut found: BTreeMap<String, Vec<(u64, String)>> = BTreeMap::new();
+    for changed in relabeled {
+        let name = &names[changed.table];
+        let row = recordings[name].poses.rows[changed.row];
+        let entry = found.entry(name.clone()).or_default();
+        entry.push((row, changed.exchanged.join(" ↔ ")));
+    }
+    found
+        .into_iter()
+        .map(|(recording, rows)| finding(&recording, body, &rows))
+        .collect()
+}
+
+/// Marker points by name, one for each row; `None` where it was not seen.
+pub type Tracks = BTreeMap<String, Vec<Option<Point3<f64>>>>;
+
+/// A row whose labels were put right.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Relabeled {
+    /// The table, in the order given.
+    pub table: usize,
+    /// Its row, from 0.
+    pub row: usize,
+    /// The markers whose places changed, in the order of their names.
+    pub exchanged: Vec<String>,
+}
+
+/// Puts the labels of one body's markers right in all tables, by the distances that most rows have. `stated`: σ of a marker coordinate, m.
+pub fn put_right(
+    tables: &mut [&mut Tracks],
+    markers: &[String],
+    stated: Option<f64>,
+) -> Vec<Relabeled> {
+    let length = |table: &Tracks| table.values().map(Vec::len).max().unwrap_or(0);
+    let rows: Vec<(usize, usize)> = tables
         .iter()
-        .flat_map(|(name, r)| (0..r.poses.len()).map(|row| (name.clone(), row)))
+        .enumerate()
+        .flat_map(|(t, table)| (0..length(table)).map(move |row| (t, row)))
         .collect();
     let mut problem = Problem::new(rows.len());
-    let (tracker, frame) = (
-        problem.frame("tracker"),
-        problem.frame(&format!("body {body}")),
-    );
+    let (tracker, frame) = (problem.frame("tracker"), problem.frame("body"));
     let noise = problem.noise_group("marker", NoiseKind::Position, 1.0, false);
     let points: Vec<PointId> = markers
         .iter()
@@ -73,10 +120,10 @@ fn relabel_body(
     let mut observations = Vec::new();
     // Marker of each observation, as the file has it.
     let mut labels = Vec::new();
-    for (sample, (recording, row)) in rows.iter().enumerate() {
+    for (sample, (table, row)) in rows.iter().enumerate() {
         for (k, marker) in markers.iter().enumerate() {
-            let track = recordings[recording].poses.markers.get(marker);
-            if let Some(position) = track.and_then(|track| track[*row]) {
+            let track = tables[*table].get(marker);
+            if let Some(position) = track.and_then(|track| *track.get(*row)?) {
                 observations.push(MarkerObservation {
                     sample,
                     point: points[k],
@@ -90,38 +137,33 @@ fn relabel_body(
     let Some(tolerance) = tolerance(&observations, &labels, markers.len(), stated) else {
         return Vec::new();
     };
-    problem.markers(body, tracker, frame, noise, observations);
+    problem.markers("body", tracker, frame, noise, observations);
     let changed = calib_core::relabel(&mut problem, tolerance);
     let Some(MeasurementKind::Markers(measurement::Markers { observations, .. })) =
         problem.measurements().first().map(|h| &h.kind)
     else {
         return Vec::new();
     };
-    // Recording → rows with the markers that were exchanged.
-    let mut found: BTreeMap<String, Vec<(u64, String)>> = BTreeMap::new();
+    let mut relabeled = Vec::new();
     for sample in changed {
-        let (recording, row) = &rows[sample.sample];
-        let Some(loaded) = recordings.get_mut(recording) else {
-            continue;
-        };
-        let mut exchanged: Vec<&str> = Vec::new();
+        let (table, row) = rows[sample.sample];
+        let mut exchanged: Vec<String> = Vec::new();
         for (item, point) in &sample.changes {
             if let Some(k) = points.iter().position(|p| p == point)
-                && let Some(track) = loaded.poses.markers.get_mut(&markers[k])
+                && let Some(track) = tables[table].get_mut(&markers[k])
             {
-                track[*row] = Some(observations[*item].position);
-                exchanged.push(&markers[k]);
+                track[row] = Some(observations[*item].position);
+                exchanged.push(markers[k].clone());
             }
         }
         exchanged.sort_unstable();
-        let row = loaded.poses.rows[*row];
-        let entry = found.entry(recording.clone()).or_default();
-        entry.push((row, exchanged.join(" ↔ ")));
+        relabeled.push(Relabeled {
+            table,
+            row,
+            exchanged,
+        });
     }
-    found
-        .into_iter()
-        .map(|(recording, rows)| finding(&recording, body, &rows))
-        .collect()
+    relabeled
 }
 
 fn finding(recording: &str, body: &str, rows: &[(u64, String)]) -> Finding {

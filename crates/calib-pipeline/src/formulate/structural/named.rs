@@ -123,7 +123,9 @@ fn of_hypothesis(layout: &Layout<'_>, outcome: &Outcome, scoped: &Scoped) -> Fin
         }
         Hypothesis::MissingColumn { joint } => {
             let subject = Subject::joint(layout.joint(joint));
-            Finding::of_kind(catalog::JOINT_COLUMN_MISSING, "moved", subject)
+            let empty = outcome.assumed_zero.iter().any(|(j, _)| *j == joint);
+            let kind = if empty { "moved" } else { "stuck" };
+            Finding::of_kind(catalog::JOINT_COLUMN_MISSING, kind, subject)
                 .with("joint", Fact::name(layout.joint(joint)))
                 .with("unit", Fact::choice(layout.shown(joint, 0.0).1))
         }

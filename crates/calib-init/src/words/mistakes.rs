@@ -1,0 +1,153 @@
+//! What is said of mistakes in the recordings, corrected or not.
+
+use calib_finding::{Unit, number};
+
+use super::{length_unit, mm, plural};
+use crate::fact::{About, Residuals};
+use crate::mistake::Mistake;
+
+/// A mistake that was found, with what was done about it.
+pub(super) fn sentence(about: &About) -> String {
+    match about {
+        About::Corrected {
+            mistake,
+            residuals,
+            equivalent,
+        } => corrected(mistake, residuals, equivalent),
+        About::NotCorrected {
+            mistake,
+            residuals,
+            equivalent,
+        } => format!(
+            "{} It explains the recordings ({}), but no profile corrects it: correct the table, or see what `calib check` says.{}",
+            found(mistake),
+            improvement(residuals),
+            not_distinguished(equivalent)
+        ),
+        About::SignOrMirror {
+            mistakes,
+            residuals,
+            equivalent,
+        } => sign_or_mirror(
+            mistakes,
+            &improvement(residuals),
+            &not_distinguished(equivalent),
+        ),
+        _ => String::new(),
+    }
+}
+
+/// What is wrong, as a sentence.
+fn found(mistake: &Mistake) -> String {
+    match mistake {
+        Mistake::Sign { joint } => format!("Joint `{joint}` counts against the axis of the URDF."),
+        Mistake::Exchange { first, second } => {
+            format!("The columns of `{first}` and `{second}` are exchanged.")
+        }
+        Mistake::Unit {
+            joint: Some(joint),
+            unit,
+        } => format!("The column of `{joint}` is in {unit}."),
+        Mistake::Unit { joint: None, unit } => format!("The joint columns are in {unit}."),
+        Mistake::TrackerUnit { unit } => {
+            format!("The tracker's lengths are in {}.", length_unit(unit))
+        }
+        Mistake::Offset { joint, degrees } => format!(
+            "The zero of `{joint}` is off: {} must be added.",
+            number::plain(degrees.to_radians(), Unit::Radian)
+        ),
+        Mistake::Rows { rows } => format!(
+            "Joint values and tracker rows are paired {} off.",
+            plural(rows.unsigned_abs().into(), "row", "rows")
+        ),
+        Mistake::Mirrored => "The tracker's frame is left-handed.".to_owned(),
+        Mistake::TrackerMoved => {
+            "The tracker moved, or its axes changed, between recordings.".to_owned()
+        }
+        Mistake::Remounted { body } => {
+            format!("`{body}` moved on its link between recordings.")
+        }
+        Mistake::Poses => "The convention of the tracked poses was misread.".to_owned(),
+        Mistake::MissingColumn { joint } => {
+            format!("Joint `{joint}` moved, and no column has its readings.")
+        }
+        Mistake::StoodAt {
+            joint,
+            value,
+            turns,
+        } => {
+            let unit = if *turns { Unit::Radian } else { Unit::Meter };
+            format!(
+                "Joint `{joint}` stood at {}; no column says so.",
+                number::plain(*value, unit)
+            )
+        }
+        Mistake::Link { body, link } => format!("`{body}` is on `{link}`."),
+        Mistake::Bodies { first, second } => {
+            format!("`{first}` and `{second}` are exchanged.")
+        }
+        Mistake::Other => "A mistake in the recordings stands out.".to_owned(),
+    }
+}
+
+fn improvement(residuals: &Residuals) -> String {
+    let next = residuals.next.map_or_else(String::new, |next| {
+        format!(", the next best explanation leaves {}", mm(next))
+    });
+    format!(
+        "{} rms without, {} with it{next}",
+        mm(residuals.none),
+        mm(residuals.best)
+    )
+}
+
+/// The corrections that explain the recordings as well.
+fn not_distinguished(equivalent: &[Vec<Mistake>]) -> String {
+    const MOST: usize = 3;
+    let mut others: Vec<String> = equivalent
+        .iter()
+        .take(MOST)
+        .map(|all| all.iter().map(found).collect::<Vec<_>>().join(" "))
+        .collect();
+    if equivalent.len() > MOST {
+        others.push(format!("{} more.", equivalent.len() - MOST));
+    }
+    match others.is_empty() {
+        true => String::new(),
+        false => format!(
+            " These recordings do not distinguish it from: {}",
+            others.join(" Or: ")
+        ),
+    }
+}
+
+fn corrected(mistake: &Mistake, residuals: &Residuals, equivalent: &[Vec<Mistake>]) -> String {
+    let others = not_distinguished(equivalent);
+    let doubt = residuals.over.map_or_else(String::new, |limit| {
+        format!(
+            " This is not certain: errors of 1° and 10 mm explain {} only, so that another mistake may be behind it.",
+            mm(limit)
+        )
+    });
+    format!(
+        "{} Corrected here ({}).{doubt}{others}",
+        found(mistake),
+        improvement(residuals)
+    )
+}
+
+/// Joints that count the other way, or a left-handed tracker: what decides it, and what to do then.
+fn sign_or_mirror(mistakes: &[Mistake], improvement: &str, others: &str) -> String {
+    let joint = |mistake: &Mistake| match mistake {
+        Mistake::Sign { joint } => Some(joint.clone()),
+        _ => None,
+    };
+    let joints: Vec<String> = mistakes.iter().filter_map(joint).collect();
+    let all: Vec<String> = mistakes.iter().map(found).collect();
+    let first = joints.first().map_or("", String::as_str);
+    format!(
+        "{} It explains the recordings ({improvement}).{others} Nothing is corrected, because the real robot moves differently in these cases. Move `{first}` by a positive amount: if it moves against its axis in the URDF, write `reversed: [{}]` below `columns`; if it moves along it, correct the axes of the tracker's export.",
+        all.join(" "),
+        joints.join(", ")
+    )
+}

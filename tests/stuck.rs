@@ -1,0 +1,104 @@
+//! A joint that moved while its column, or `hold` in the profile, says that it stood still: it is named, wherever it is in the chain and whatever the
+//! design; joints that did stand still are not.
+
+use crate::scratch::Scratch;
+use crate::structural::{Design, FOUR, ONE, Setting, column, findings, named};
+
+const JOINTS: [&str; 5] = ["waist", "shoulder", "elbow", "wrist_pitch", "wrist_roll"];
+
+/// Every joint, seen by four markers and by one where that shows it, with the column stuck at 0 or at another position.
+#[test]
+fn a_joint_that_moved_while_its_column_is_stuck_is_named() {
+    for (seed, joint) in (71..).zip(JOINTS) {
+        for (markers, at) in [(FOUR, 0.0), (FOUR, 20.0), (ONE, 0.0)] {
+            // One marker near the axis of the last joint shows hardly more of it than errors of the robot.
+            if markers == ONE && joint == "wrist_roll" {
+                continue;
+            }
+            let setting = Setting::new(Design::Random(40), markers, seed);
+            let tables = setting.tables();
+            let dir = column(setting.folder(), &tables, &format!("{joint}_deg"), |_| at);
+            let finding = named(&dir, "joint-column-missing", joint, &tables);
+            let said = finding["text"].as_str().expect("text");
+            assert!(
+                said.contains("whose readings never change, moved"),
+                "{said}"
+            );
+        }
+    }
+}
+
+/// In sweeps all other joints stand still, so that only the swept one can be stuck.
+#[test]
+fn a_sweep_whose_own_column_is_stuck_is_named() {
+    for (seed, joint) in (81..).zip(["waist", "elbow", "wrist_pitch"]) {
+        let setting = Setting::new(Design::Sweeps, FOUR, seed);
+        let of_joint = vec![joint.to_owned()];
+        let dir = column(setting.folder(), &of_joint, &format!("{joint}_deg"), |_| {
+            10.0
+        });
+        let found = findings(&dir);
+        let wrong: Vec<_> = found.iter().filter(|f| f["severity"] == "error").collect();
+        let [one] = wrong[..] else {
+            panic!("{found:#?}")
+        };
+        let said = one["text"].as_str().expect("text");
+        assert!(said.contains(&format!("`{joint}`")), "{found:#?}");
+        assert_eq!(
+            one["about"]["recordings"],
+            serde_json::json!([joint]),
+            "{found:#?}"
+        );
+    }
+}
+
+/// Two joints, of which one is stuck: the other alone says little of where the tracker is.
+#[test]
+fn of_a_pan_tilt_unit_the_stuck_joint_is_named() {
+    const URDF: &str = "<robot name=\"unit\"><link name=\"base\"/><link name=\"head\"/><link name=\"eye\"/>
+  <joint name=\"pan\" type=\"revolute\"><parent link=\"base\"/><child link=\"head\"/><origin xyz=\"0 0 0.5\"/><axis xyz=\"0 0 1\"/>
+    <limit lower=\"-2.5\" upper=\"2.5\" effort=\"1\" velocity=\"1\"/></joint>
+  <joint name=\"tilt\" type=\"revolute\"><parent link=\"head\"/><child link=\"eye\"/><origin xyz=\"0.02 0 0.1\"/><axis xyz=\"0 1 0\"/>
+    <limit lower=\"-1.2\" upper=\"1\" effort=\"1\" velocity=\"1\"/></joint></robot>
+";
+    const PROFILE: &str = "calib: 1
+robot: {name: unit, urdf: unit.urdf}
+tracker: {frame: lab, marker_sigma_mm: 0.2}
+bodies:
+  eye_body: {link: eye, markers: [m1, m2, m3, m4]}
+recordings:
+  poses: {file: poses.csv, use: static}
+solve:
+  free: [bodies, tracker, joint_offsets, joint_axes]
+simulate:
+  seed: 5
+  tracker_from_root: {xyz_mm: [140, -60, 742], rpy_deg: [2, -1, 40]}
+  mounts:
+    eye_body: {xyz_mm: [60, 0, 30], markers_mm: {m1: [0, 0, 0], m2: [-60, 70, 20], m3: [-110, -20, 50], m4: [-30, -60, -10]}}
+  errors: {joint_offset_deg: 0.3, axis_mm: 0.8, axis_deg: 0.15}
+  noise: {marker_mm: 0.2}
+  recordings:
+    poses: {random: {pan_deg: [-135, 135], tilt_deg: [-60, 54]}, poses: 50}
+";
+    let unit = || {
+        let dir = Scratch::new()
+            .file("unit.urdf", URDF)
+            .file("unit.yaml", PROFILE);
+        dir.calib(["simulate", "unit.yaml", "--out", "."]).expect(0);
+        dir
+    };
+    for joint in ["pan", "tilt"] {
+        let dir = column(
+            unit(),
+            &["poses".to_owned()],
+            &format!("{joint}_deg"),
+            |_| 0.0,
+        );
+        let said = dir.calib(["check", "unit.yaml"]).expect(3).stdout;
+        let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+        let wanted = format!("if joint `{joint}`, whose readings never change, moved");
+        assert!(said.contains(&wanted), "{said}");
+        assert_eq!(said.matches("error[").count(), 1, "{said}");
+    }
+    unit().calib(["check", "unit.yaml"]).expect(0);
+}
