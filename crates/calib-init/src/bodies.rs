@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use calib_checks::rigid_body::{BodyPoses, Distances, NotABody, body_poses, rigid_groups};
+use calib_checks::rigid_body::rigid_groups;
 use calib_recording::{BodyStream, Filled, MarkerStream};
 use calib_urdf::RobotModel;
 use nalgebra::Point3;
@@ -67,7 +67,7 @@ pub fn bodies(
             About::Points {
                 markers: markers.len(),
             }
-        } else if let Ok(poses) = usual_poses(&markers, &of_group) {
+        } else if let Ok(poses) = labels::usual_poses(&markers, &of_group) {
             let sigma = poses.sigma.filter(|s| *s > CALCULATED);
             calculated |= poses.sigma.is_some_and(|s| s <= CALCULATED);
             let rows = poses.rows.iter().filter(|r| r.is_ok()).count();
@@ -102,19 +102,6 @@ pub fn bodies(
     };
     facts.push(Fact::new(Place::Tracker, about));
     (found, facts)
-}
-
-/// The poses of a body by its usual samples: single wild ones are no noise.
-///
-/// # Errors
-/// As [`body_poses`].
-pub(crate) fn usual_poses(
-    names: &[String],
-    tracks: &[&[Option<Point3<f64>>]],
-) -> Result<BodyPoses, NotABody> {
-    let usual = Distances::of(tracks, None).without_gross(tracks);
-    let usual: Vec<&[Option<Point3<f64>>]> = usual.iter().map(Vec::as_slice).collect();
-    body_poses(names, &usual, None, None)
 }
 
 fn streams(sources: &[Source]) -> impl Iterator<Item = &BodyStream> {

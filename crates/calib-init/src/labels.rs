@@ -2,12 +2,11 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use calib_checks::rigid_body::rigid_groups;
+use calib_checks::rigid_body::{BodyPoses, Distances, NotABody, body_poses, rigid_groups};
 use calib_pipeline::prepare::relabel::{Relabeled, Tracks, put_right};
 use calib_recording::Poses;
 use nalgebra::Point3;
 
-use crate::bodies::{Found, usual_poses};
 use crate::fact::{About, Fact, Place};
 
 /// Scatter of a coordinate, m, above which markers do not keep their distances: no tracker has so much noise.
@@ -33,11 +32,11 @@ pub fn in_tracks(tracks: &mut Tracks) -> Vec<Fact> {
     facts
 }
 
-/// Puts the labels of these bodies right in the tables.
-pub fn in_tables(tables: &mut [Poses], bodies: &[Found]) {
-    for body in bodies.iter().filter(|body| body.markers.len() >= 3) {
+/// Puts the labels of bodies, each the names of its markers, right in the tables.
+pub fn in_tables<'m>(tables: &mut [Poses], bodies: impl Iterator<Item = &'m [String]>) {
+    for markers in bodies.filter(|markers| markers.len() >= 3) {
         let mut all: Vec<&mut Tracks> = tables.iter_mut().map(|t| &mut t.markers).collect();
-        put_right(&mut all, &body.markers, None);
+        put_right(&mut all, markers, None);
     }
 }
 
@@ -76,6 +75,19 @@ fn sets(tracks: &Tracks) -> Vec<Vec<String>> {
         }
     }
     sets
+}
+
+/// The poses of a body by its usual samples: single wild ones are no noise.
+///
+/// # Errors
+/// As [`body_poses`].
+pub fn usual_poses(
+    names: &[String],
+    tracks: &[&[Option<Point3<f64>>]],
+) -> Result<BodyPoses, NotABody> {
+    let usual = Distances::of(tracks, None).without_gross(tracks);
+    let usual: Vec<&[Option<Point3<f64>>]> = usual.iter().map(Vec::as_slice).collect();
+    body_poses(names, &usual, None, None)
 }
 
 fn is_one_body(tracks: &Tracks, set: &[String]) -> bool {

@@ -344,12 +344,15 @@ impl Scene<'_> {
             if stated.iter().any(|(b, _)| b == body) {
                 continue;
             }
-            for tip in &tips {
+            let near = choices.iter().filter(|(b, _)| b == body);
+            let near = near.flat_map(|(_, choice)| &choice.same);
+            let near = near.filter_map(|name| self.model.link_id(name).ok());
+            for link in tips.iter().copied().chain(near) {
                 let mut on = best.on.clone();
-                if on[at].1 == *tip {
+                if on[at].1 == link {
                     continue;
                 }
-                on[at].1 = *tip;
+                on[at].1 = link;
                 let asked = Assigned::new(on.clone(), self.ask(chain, &on));
                 if asked.explains_more_than(&best) {
                     best = asked;

@@ -94,7 +94,10 @@ pub fn tables(
         }
     };
     let mut tables: Vec<Poses> = drafts.iter().map(of).collect::<Result<_, _>>()?;
-    labels::in_tables(&mut tables, found);
+    labels::in_tables(
+        &mut tables,
+        found.iter().map(|body| body.markers.as_slice()),
+    );
     Ok(tables)
 }
 

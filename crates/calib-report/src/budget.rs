@@ -112,6 +112,16 @@ impl Budget {
         COVERAGE_FACTOR * self.combined_m
     }
 
+    /// What noise and the uncertainty of the parameters contribute, m.
+    pub(crate) fn stated_m(&self) -> f64 {
+        let rows = self.rows.iter();
+        let known = rows.filter(|row| row.kind != ErrorSource::NotModeled);
+        known
+            .map(|row| row.contribution_m.powi(2))
+            .sum::<f64>()
+            .sqrt()
+    }
+
     /// Share of the variance.
     pub(crate) fn share(&self, row: &BudgetRow) -> f64 {
         (row.contribution_m / self.combined_m).powi(2)

@@ -191,8 +191,11 @@ fn is_left_by_change(report: &Report, error: &crate::Finding) -> bool {
 }
 
 fn structural(report: &Report) -> Option<Diagnosis> {
+    // Where positions are off, wrong orientations are no other fault.
+    let beside = |id| id == ReasonId::OrientationOff && any_exceeded(report);
     let mut reasons = report.reason_facts.iter();
-    let reason = reasons.find(|r| r.effect != Effect::Supports && STRUCTURAL.contains(&r.id))?;
+    let is_one = |id| STRUCTURAL.contains(&id) && !beside(id);
+    let reason = reasons.find(|r| r.effect != Effect::Supports && is_one(r.id))?;
     Some(Diagnosis::StructuralFault {
         evidence: reason.id.as_str().to_owned(),
     })

@@ -3,11 +3,12 @@
 use rayon::prelude::*;
 
 use super::apply::{apply, apply_all};
-use super::candidates::{Candidate, candidates, of_axes, of_still, span};
+use super::candidates::{Candidate, candidates, span};
 use super::continuous;
 use super::data::{Data, DataError};
 use super::expected::expected;
 use super::few;
+use super::further::further;
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{JointIndex, SampleIndex};
 use super::jump::jump;
@@ -127,17 +128,16 @@ fn decided(asked: &Asked<'_>, outcome: &mut Outcome) -> Correction {
         ..
     } = *asked;
     outcome.expected = expected(data, screened, options);
-    // Where something is wrong, joints that never moved are asked, since no other data say where they stood, and axes of the model.
     let wrong = outcome.expected.is_some_and(|e| ranking.none.rms > e.limit);
-    let more = if wrong && options.suspects.is_empty() {
-        [of_still(data), of_axes(data)].concat()
-    } else {
-        Vec::new()
-    };
-    let (all, with_more) = (
-        [asked.candidates, &more].concat(),
-        ranking.with(Ranking::of(data, &more, screened)),
-    );
+    let more = further(data, screened, options, wrong);
+    let mut of_more = Ranking::of(data, &more, screened);
+    if !wrong {
+        // A place that is off by a few degrees is an error that the fit finds.
+        of_more
+            .scored
+            .retain(|s| !matches!(s.scoped.hypothesis, Hypothesis::StoodAt { .. }));
+    }
+    let (all, with_more) = ([asked.candidates, &more].concat(), ranking.with(of_more));
     let asked = &Asked {
         candidates: &all,
         ranking: &with_more,

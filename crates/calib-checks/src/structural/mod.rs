@@ -58,6 +58,7 @@ mod data;
 mod decide;
 mod expected;
 mod few;
+mod further;
 mod hypothesis;
 mod ids;
 mod jump;

@@ -72,7 +72,7 @@ impl Asked<'_> {
             evidence: Evidence {
                 none: ranking.none.rms,
                 best: best.score.rms,
-                next: others().next().map(Scored::left),
+                next: others().next().map(|s| s.left_beside(best)),
                 ratio: ranking.ratio(best.score.score),
             },
             left: self.left(&corrected),

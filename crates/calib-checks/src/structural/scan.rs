@@ -29,11 +29,12 @@ pub(crate) struct Scored {
 }
 
 impl Scored {
-    /// What is left, m, as it stands beside what others leave: another unit of length would make any residual small.
-    pub fn left(&self) -> f64 {
-        match self.scoped.hypothesis {
-            Hypothesis::TrackerUnit { .. } => self.score.score,
-            _ => self.score.rms,
+    /// What is left, m, as it stands beside what `best` leaves: another unit of length would make any residual small.
+    pub fn left_beside(&self, best: &Self) -> f64 {
+        let is_unit = |s: &Self| matches!(s.scoped.hypothesis, Hypothesis::TrackerUnit { .. });
+        match is_unit(self) && !is_unit(best) {
+            true => self.score.score,
+            false => self.score.rms,
         }
     }
 }

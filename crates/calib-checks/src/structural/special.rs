@@ -229,10 +229,22 @@ fn missing_column(scope: Scope, joint: JointIndex, data: &Data) -> Data {
         return best;
     }
     // Where few other joints move a body, the registration of a joint at rest holds it there.
-    let motion = common_motion(&still);
-    let scale = START * range(data, joint);
-    for sign in [scale, -scale] {
-        let (filled, rms) = estimated(start(&|i| sign * motion[i]), joint, &rows, &[]);
+    let [first, second] = common_motions(&still);
+    let along = START * range(data, joint);
+    let turns = data.chain.turns(joint.0) == Some(true);
+    let mut starts: Vec<Vec<f64>> = [along, -along]
+        .into_iter()
+        .map(|scale| first.iter().map(|m| scale * m).collect())
+        .collect();
+    if turns {
+        // Points that go round and round spread along two directions, by the cosine and the sine.
+        let angle = |sign: f64| move |(a, b): (&f64, &f64)| (sign * b).atan2(*a);
+        for sign in [1.0, -1.0] {
+            starts.push(first.iter().zip(&second).map(angle(sign)).collect());
+        }
+    }
+    for values in starts {
+        let (filled, rms) = estimated(start(&|i| values[i]), joint, &rows, &[]);
         if rms < least {
             (best, least) = (filled, rms);
         }
@@ -240,38 +252,44 @@ fn missing_column(scope: Scope, joint: JointIndex, data: &Data) -> Data {
     best
 }
 
-/// What the residuals of all rows have in common, row by row: the direction that they spread along most, with a mean square of 1.
-fn common_motion(data: &Data) -> Vec<f64> {
+/// What the residuals of all rows have in common, row by row: the two directions that they spread along most, each with a mean square of 1.
+fn common_motions(data: &Data) -> [Vec<f64>; 2] {
     const ROUNDS: usize = 50;
     let scan = Scan::new(data, &[]);
     let fit = scan.fit(None);
     let n = scan.channels.len();
     let rows = data.readings.len();
     let residual = |i: usize, k: usize| match scan.weights[i * n + k] > 0.0 {
-        true => scan.seen(&fit, i, k) - scan.predicted(&fit, i, k).0,
+        true => scan.residual(&fit, i, k),
         false => Vector3::zeros(),
     };
     let all: Vec<Vector3<f64>> = (0..rows * n).map(|at| residual(at / n, at % n)).collect();
+    let dot = |a: &[f64], b: &[f64]| -> f64 { a.iter().zip(b).map(|(a, b)| a * b).sum() };
     // Any start does that is not across the direction.
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
-    let mut motion: Vec<f64> = (1..=rows)
-        .map(|i| (golden * i as f64).fract() - 0.5)
-        .collect();
+    let seed = |k: usize| (0..rows).map(move |i| (golden * (i * 2 + k + 1) as f64).fract() - 0.5);
+    let mut motions = [0, 1].map(|k| seed(k).collect::<Vec<f64>>());
     for _ in 0..ROUNDS {
-        let mut across = vec![Vector3::zeros(); n];
-        for (at, r) in all.iter().enumerate() {
-            across[at % n] += r * motion[at / n];
+        for k in 0..2 {
+            let mut across = vec![Vector3::zeros(); n];
+            for (at, r) in all.iter().enumerate() {
+                across[at % n] += r * motions[k][at / n];
+            }
+            let along = |i: usize| -> f64 { (0..n).map(|c| all[i * n + c].dot(&across[c])).sum() };
+            let mut next: Vec<f64> = (0..rows).map(along).collect();
+            if k == 1 {
+                let share = dot(&next, &motions[0]) / rows.max(1) as f64;
+                next.iter_mut()
+                    .zip(&motions[0])
+                    .for_each(|(m, first)| *m -= share * first);
+            }
+            let mean = dot(&next, &next) / rows.max(1) as f64;
+            let scale = if mean > 0.0 { mean.sqrt().recip() } else { 0.0 };
+            next.iter_mut().for_each(|m| *m *= scale);
+            motions[k] = next;
         }
-        let along = |i: usize| -> f64 { (0..n).map(|k| all[i * n + k].dot(&across[k])).sum() };
-        motion = (0..rows).map(along).collect();
-        let mean = motion.iter().map(|m| m * m).sum::<f64>() / rows.max(1) as f64;
-        if mean <= 0.0 {
-            return vec![0.0; rows];
-        }
-        let scale = mean.sqrt().recip();
-        motion.iter_mut().for_each(|m| *m *= scale);
     }
-    motion
+    motions
 }
 
 /// The data with the position of a joint in these rows taken from the tracker, beginning at the registration of the rows that are

@@ -1,6 +1,7 @@
 //! Why a result was not accepted, and the command that comes next.
 
 use super::prose::{code, full_stop};
+use crate::budget::Budget;
 use crate::shell_path;
 use crate::{Diagnosis, Output, ReasonId, Report, Unit, Verdict, number};
 
@@ -100,6 +101,27 @@ impl Diagnosis {
 
 /// A selection that was made would answer the same again.
 fn unexplained(report: &Report, again: &str) -> [String; 2] {
+    /// Held-out poses that are off by more times what is left of the fitted ones are unlike these.
+    const APART: f64 = 5.0;
+    let held_out = report.verification.held_out.as_ref();
+    let held_out = held_out.filter(|held_out| !held_out.left_out);
+    let held_out = held_out.and_then(|held_out| held_out.calibrated.as_ref());
+    let fitted = report.residuals.all.as_ref();
+    let stated = Budget::of(report).map(|budget| budget.stated_m());
+    if let (Some(held_out), Some(fitted), Some(stated)) = (held_out, fitted, stated)
+        && held_out.rms_m > APART * fitted.rms_m.max(stated)
+    {
+        let [held_out, fitted] =
+            [held_out.rms_m, fitted.rms_m].map(|m| number::plain(m, Unit::Meter));
+        return [
+            format!(
+                "The held-out poses are off by {held_out} rms, though the calibrated model fits the others to {fitted}: something changed between these recordings, or readings of one of them are wrong."
+            ),
+            format!(
+                "Compare the joint columns and the tracker's frame of the recordings, and repeat the held-out one in the state of the others, then run `{again}`."
+            ),
+        ];
+    }
     match report.selection {
         None => [
             "The error is larger than the limit, and no single known effect explains it."

@@ -1,0 +1,64 @@
+//! Candidates that are asked beside those of every recording, where something speaks for them.
+
+use super::candidates::{Candidate, of_axes, of_still};
+use super::data::Data;
+use super::hypothesis::Scope;
+use super::ids::{RecordingIndex, SampleIndex};
+use super::outcome::Options;
+use super::scan::Scan;
+
+/// Joints that never moved, since no other data say where they stood, in all recordings or in one that is unlike the others; where something is `wrong`,
+/// in any, and axes of the model.
+pub(super) fn further(
+    data: &Data,
+    screened: &[SampleIndex],
+    options: &Options,
+    wrong: bool,
+) -> Vec<Candidate> {
+    let suspects = &options.suspects;
+    let mut more = of_still(data);
+    let single = |scope: &Scope| matches!(scope, Scope::Recording(_));
+    let parts = more.iter().any(|(_, scopes)| scopes.iter().any(single));
+    let odd = match parts && !wrong {
+        true => odd_recordings(data, screened),
+        false => Vec::new(),
+    };
+    let asked = |scope: &Scope| match scope {
+        Scope::Recording(r) => {
+            (suspects.is_empty() || suspects.contains(r)) && (wrong || odd.contains(r))
+        }
+        _ => suspects.is_empty(),
+    };
+    more.iter_mut().for_each(|(_, scopes)| scopes.retain(asked));
+    more.retain(|(_, scopes)| !scopes.is_empty());
+    if wrong && suspects.is_empty() {
+        more.extend(of_axes(data));
+    }
+    more
+}
+
+/// Recordings that the registration of all fits far worse than it fits the others.
+fn odd_recordings(data: &Data, screened: &[SampleIndex]) -> Vec<RecordingIndex> {
+    /// So many times worse.
+    const FAR: f64 = 3.0;
+    let scan = Scan::new(data, screened);
+    let fit = scan.fit(None);
+    let n = scan.channels.len();
+    let mut sums = vec![(0.0, 0.0); scan.recordings];
+    for (i, recording) in data.recording.iter().enumerate() {
+        for k in (0..n).filter(|k| scan.weights[i * n + k] > 0.0) {
+            let (squares, count) = &mut sums[recording.0];
+            *squares += scan.residual(&fit, i, k).norm_squared();
+            *count += 1.0;
+        }
+    }
+    let all: (f64, f64) = sums
+        .iter()
+        .fold((0.0, 0.0), |all, one| (all.0 + one.0, all.1 + one.1));
+    let is_odd = |(squares, count): &(f64, f64)| {
+        let others = (all.0 - squares) / (all.1 - count).max(1.0);
+        *count > 0.0 && all.1 > *count && squares / count > FAR * FAR * others
+    };
+    let odd = sums.iter().enumerate().filter(|(_, one)| is_odd(one));
+    odd.map(|(r, _)| RecordingIndex(r)).collect()
+}
