@@ -69,7 +69,12 @@ fn first_line(dir: &Scratch, table: &str) -> u64 {
 
 /// The report, and the patched robot.
 fn calibrated(dir: &Scratch) -> (Value, String) {
-    let ran = dir.calib(["run", "arm.yaml", "--out", "out"]);
+    calibrated_with(dir, &[])
+}
+
+/// The same with more arguments.
+fn calibrated_with(dir: &Scratch, more: &[&str]) -> (Value, String) {
+    let ran = dir.calib_with(&[&["run", "arm.yaml", "--out", "out"], more].concat());
     assert!([0, 1, 4].contains(&ran.code), "{}", ran.stderr);
     let files = dir.files("out");
     let urdf = files.keys().find(|name| name.ends_with(".urdf"));
@@ -200,7 +205,7 @@ fn with_a_standing_column(markers: Markers, at: f64) -> Scratch {
 }
 
 /// Three of four rows repeat the readings of the row before: where the column has the value of the first of them, the others are left out, and count for
-/// no fault of the model; where it has another value, the column is named, and no limit is said to be too small.
+/// no fault of the model; where it has another value, the column is named before the fit, and after it if that is forced.
 #[test]
 fn a_column_that_stands_still_is_named_or_its_rows_are_left_out() {
     let first = with_a_standing_column(FOUR, -80.0);
@@ -223,7 +228,7 @@ fn a_column_that_stands_still_is_named_or_its_rows_are_left_out() {
     );
 
     let other = with_a_standing_column(FOUR, 0.0);
-    let (report, _) = calibrated(&other);
+    let (report, _) = calibrated_with(&other, &["--force"]);
     assert!(found(findings(&report)).is_empty());
     let ours = findings(&report)
         .iter()
@@ -232,11 +237,13 @@ fn a_column_that_stands_still_is_named_or_its_rows_are_left_out() {
     assert_eq!(ours["about"]["name"], "wrist_roll");
     assert_eq!(ours["about"]["recordings"], serde_json::json!(["grid"]));
     assert_eq!(report["diagnosis"]["kind"], "structural_fault");
-    assert_eq!(report["diagnosis"]["evidence"], "joint-never-moved");
+    assert_eq!(report["diagnosis"]["evidence"], "joint-column-missing");
     let checked = other.calib(["check", "arm.yaml", "--json"]).json();
     let all = checked["findings"].as_array().expect("a list");
+    let errors: Vec<&Value> = all.iter().filter(|f| f["severity"] == "error").collect();
     assert!(
-        all.iter().any(|f| f["id"] == "joint-never-moved"),
+        matches!(&errors[..], [one] if one["id"] == "joint-column-missing"
+            && one["about"]["recordings"] == serde_json::json!(["grid"])),
         "{all:#?}"
     );
 }
@@ -244,7 +251,7 @@ fn a_column_that_stands_still_is_named_or_its_rows_are_left_out() {
 /// Of one marker nothing but the fit says how it scatters: 20 mm are not called the tracker's.
 #[test]
 fn noise_that_no_tracker_has_makes_no_limit_too_small() {
-    let (report, _) = calibrated(&with_a_standing_column(ONE, 0.0));
+    let (report, _) = calibrated_with(&with_a_standing_column(ONE, 0.0), &["--force"]);
     assert_eq!(report["verdict"], "rejected");
     let noise = report["noise"].as_array().expect("a list").iter();
     let marker = noise

@@ -315,7 +315,7 @@ fn a_joint_that_is_stuck_in_the_checks_is_named() {
     let said: Value = serde_json::from_str(&ran.stdout).expect("JSON");
     let said = said.to_string();
     assert!(
-        said.contains("model-disagrees") && !said.contains("unit-mismatch"),
+        said.contains("joint-column-missing") && !said.contains("unit-mismatch"),
         "{said}"
     );
 }

@@ -45,6 +45,8 @@ fn still(turns: bool) -> f64 {
 fn at_zero(turns: bool) -> f64 {
     if turns { 0.05 } else { 0.02 }
 }
+/// Readings of their own that explain so many times more than one place take up no errors of the robot.
+const BEYOND_ERRORS: f64 = 4.0;
 /// One place for all rows is the explanation unless a reading per row explains this many times as much.
 const SIMPLER: f64 = 1.2;
 
@@ -79,7 +81,7 @@ fn empty_column(scan: &Scan<'_>, scoped: Scoped, joint: JointIndex, filled: &Dat
     };
     let (stood, value) = stood_at(scan, scoped, joint, found.middle);
     let turns = scan.data.chain.turns(joint.0) != Some(false);
-    let still = found.spread < still(turns);
+    let still = found.spread < still(turns) && stood.score.rms < BEYOND_ERRORS * score.rms;
     if value.abs() > at_zero(turns) && (still || stood.score.score < SIMPLER * score.score) {
         return stood;
     }
@@ -97,7 +99,8 @@ fn stuck_column(scan: &Scan<'_>, scoped: Scoped, joint: JointIndex) -> Scored {
     let mut score = penalized(scan, rows, scan.fit_corrected(&corrected).score);
     let turns = scan.data.chain.turns(joint.0) != Some(false);
     let found = special::whereabouts(scoped.scope, joint, scan.data, &corrected);
-    if found.is_none_or(|found| found.spread < still(turns)) {
+    let hardly = found.is_none_or(|found| found.spread < still(turns));
+    if hardly && stood.score.rms < BEYOND_ERRORS * score.rms {
         return stood;
     }
     // Most joints whose readings never change do stand still.
