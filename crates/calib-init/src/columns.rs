@@ -317,6 +317,11 @@ fn family(
             rest.collect()
         })
         .collect();
+    let turns = |joint: &JointId| model.joint(*joint).kind.turns();
+    let turning: Vec<Vec<JointId>> = chains
+        .iter()
+        .map(|chain| chain.iter().copied().filter(turns).collect())
+        .collect();
     let consecutive = |of: &[(u32, usize)]| of.windows(2).all(|pair| pair[1].0 == pair[0].0 + 1);
     let mut best: Option<(bool, usize, BTreeMap<JointId, usize>)> = None;
     for mut members in families.into_values() {
@@ -324,7 +329,9 @@ fn family(
         if members.len() < 2 || !consecutive(&members) {
             continue;
         }
-        let chain = chains.iter().find(|chain| chain.len() == members.len());
+        // A rail is numbered apart from the arm on it: `E1` beside `A1` to `A6`.
+        let mut all = chains.iter().chain(&turning);
+        let chain = all.find(|chain| chain.len() == members.len());
         let whole = chain.is_some();
         // Three pressures are no joints of a chain of six.
         let of_joints = name::is_of_joints(&header.names[members[0].1]);
@@ -348,7 +355,24 @@ fn family(
             best = Some((whole, members.len(), pairs.collect()));
         }
     }
-    best.map(|(_, _, pairs)| pairs)
+    let mut pairs = best.map(|(_, _, pairs)| pairs)?;
+    let with_all = |chain: &&Vec<JointId>| pairs.keys().all(|joint| chain.contains(joint));
+    let rest = chains.iter().find(with_all).into_iter().flatten();
+    let rest: Vec<JointId> = rest.copied().filter(|j| !pairs.contains_key(j)).collect();
+    let taken: BTreeSet<usize> = pairs.values().copied().collect();
+    let left = (0..header.names.len()).filter(|i| {
+        let name = &header.names[*i];
+        let free = !used.contains(i) && !taken.contains(i) && header.has_numbers(*i);
+        free && name::is_of_joints(name) && !name::is_no_position(name)
+    });
+    let left: Vec<usize> = left.collect();
+    if let ([joint], [column]) = (&rest[..], &left[..])
+        && !turns(joint)
+        && fits(model, *joint, &header.names[*column])
+    {
+        pairs.insert(*joint, *column);
+    }
+    Some(pairs)
 }
 
 /// The unit of the angles that do not name it.

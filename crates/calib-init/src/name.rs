@@ -159,7 +159,7 @@ pub fn time(name: &str) -> Option<u8> {
 }
 
 /// Words that say of a joint's column nothing but that it is one.
-const FILLERS: [&str; 14] = [
+const FILLERS: [&str; 15] = [
     "joint",
     "joints",
     "pos",
@@ -171,6 +171,7 @@ const FILLERS: [&str; 14] = [
     "measured",
     "meas",
     "state",
+    "states",
     "value",
     "q",
     "enc",
@@ -191,7 +192,9 @@ pub fn key(name: &str) -> String {
 /// Whether a numbered column's name has no other words than those of joints: `q1`, `actual_joint_2`, `A3`.
 #[must_use]
 pub fn is_of_joints(name: &str) -> bool {
-    const MORE: [&str; 6] = ["j", "a", "axis", "theta", "arm", "robot"];
+    const MORE: [&str; 9] = [
+        "j", "a", "axis", "theta", "arm", "robot", "e", "ext", "external",
+    ];
     let words = words(unit(name).stem);
     let is_known = |w: &String| {
         let word = w.as_str();

@@ -337,8 +337,9 @@ fn of_session(about: &About) -> String {
             mm(*value)
         ),
         About::FarClocks { offset, searched } => format!(
-            "The tracker's clock is {} s ahead of the robot's, by the motion of the robot: `max_offset_s` lets a run look for it up to {searched:.0} s.",
-            number::fixed(*offset, 1)
+            "The tracker's clock is {:.1} s {} the robot's, by the motion of the robot: `max_offset_s` lets a run look for it up to {searched:.0} s.",
+            offset.abs(),
+            if *offset < 0.0 { "behind" } else { "ahead of" }
         ),
         About::Holds { holds } => format!("A stream in which the robot holds {}: each gives one pose.", plural(*holds, "time", "times")),
         About::Continuous => "A stream of a motion: rows are taken from it.".to_owned(),

@@ -2,10 +2,11 @@
 
 use super::candidates::{Candidate, of_axes, of_still};
 use super::data::Data;
-use super::hypothesis::Scope;
+use super::hypothesis::{Hypothesis, Scope};
 use super::ids::{RecordingIndex, SampleIndex};
 use super::outcome::Options;
 use super::scan::Scan;
+use super::special;
 
 /// Joints that never moved, since no other data say where they stood, in all recordings or in one that is unlike the others; where something is `wrong`,
 /// in any, and axes of the model.
@@ -29,7 +30,15 @@ pub(super) fn further(
         }
         _ => suspects.is_empty(),
     };
-    more.iter_mut().for_each(|(_, scopes)| scopes.retain(asked));
+    for (hypothesis, scopes) in &mut more {
+        scopes.retain(asked);
+        // Where all seems right, only readings that explain something at once are worth a search.
+        if let Hypothesis::MissingColumn { joint } = *hypothesis
+            && !wrong
+        {
+            scopes.retain(|scope| special::explains_at_once(*scope, joint, data));
+        }
+    }
     more.retain(|(_, scopes)| !scopes.is_empty());
     if wrong && suspects.is_empty() {
         more.extend(of_axes(data));

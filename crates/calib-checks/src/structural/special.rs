@@ -4,7 +4,7 @@ use calib_geometry::registration::rigid_registration;
 use calib_geometry::so3;
 use nalgebra::{Isometry3, Matrix3, Point3, Translation3, Vector3};
 
-use super::chain::{Motion, Walk};
+use super::chain::{Chain, Motion, Walk};
 use super::correct::open_rows;
 use super::data::{Data, Measured};
 use super::hypothesis::{Hypothesis, Scope, Scoped};
@@ -23,6 +23,8 @@ const EXPLAINED: f64 = 0.2;
 const START: f64 = 0.2;
 /// Starts per row for an empty column: 30° apart, less than half the width of a basin.
 const STARTS: usize = 12;
+/// Steps from the best start to the minimum: Newton's method doubles the digits in each.
+const STEPS: usize = 8;
 /// Half the stroke (m) in which the one place of a prismatic joint is looked for.
 const STROKE: f64 = 0.6;
 
@@ -214,6 +216,23 @@ pub(crate) fn range(data: &Data, joint: JointIndex) -> f64 {
     }
 }
 
+/// Whether readings taken from the tracker, at the registration of the data as they are, leave clearly less.
+pub(super) fn explains_at_once(scope: Scope, joint: JointIndex, data: &Data) -> bool {
+    /// This part of the mean square at most.
+    const CLEARLY: f64 = 0.5;
+    let scan = Scan::new(data, &[]);
+    let fit = scan.fit(None);
+    let links: Vec<LinkIndex> = data.bodies.iter().map(|b| b.link).collect();
+    let mut walk = Walk::new(&data.chain, &links);
+    let range = range(data, joint);
+    let mut filled = data.clone();
+    for i in open_rows(scope, joint, data) {
+        filled.readings[i][joint.0] = Some(best_reading(&scan, &fit, &mut walk, i, joint, range));
+    }
+    let left = scan.fit_corrected(&filled).score.rms;
+    left * left < CLEARLY * fit.score.rms * fit.score.rms
+}
+
 fn missing_column(scope: Scope, joint: JointIndex, data: &Data) -> Data {
     let rows = open_rows(scope, joint, data);
     let start = |values: &dyn Fn(usize) -> f64| {
@@ -356,17 +375,22 @@ fn best_reading(
 ) -> f64 {
     let n = scan.channels.len();
     let mut readings = scan.readings(i).to_vec();
-    let mut cost = |q: f64| {
+    let seen: Vec<(usize, Vector3<f64>, Vector3<f64>)> = (0..n)
+        .filter(|&k| scan.weights[i * n + k] > 0.0)
+        .map(|k| {
+            let link = scan.data.bodies[scan.channels[k].body].link;
+            let m = fit.points[scan.data.recording[i].0 * n + k];
+            (link.0, m, scan.seen(fit, i, k))
+        })
+        .collect();
+    let mut cost = |q: f64| -> f64 {
         readings[joint.0] = q;
         walk.go(&scan.data.chain, &readings);
-        let mut sum = 0.0;
-        for k in (0..n).filter(|&k| scan.weights[i * n + k] > 0.0) {
-            let link = scan.data.bodies[scan.channels[k].body].link;
-            let pose = walk.root_from_link[link.0];
-            let m = fit.points[scan.data.recording[i].0 * n + k];
-            sum += (scan.seen(fit, i, k) - pose.r * m - pose.t).norm_squared();
-        }
-        sum
+        let off = |(link, m, seen): &(usize, Vector3<f64>, Vector3<f64>)| {
+            let pose = walk.root_from_link[*link];
+            (seen - pose.r * m - pose.t).norm_squared()
+        };
+        seen.iter().map(off).sum()
     };
     if scan.data.chain.turns(joint.0) == Some(false) {
         // The cost of a motion along a line is a parabola.
@@ -374,6 +398,9 @@ fn best_reading(
         let curvature = before + after - 2.0 * at;
         let least = STROKE * 0.5 * (before - after) / curvature;
         return if least.is_finite() { least } else { 0.0 };
+    }
+    if turns_alone(&scan.data.chain, joint) {
+        return Harmonics::of(cost).least();
     }
     let step = 2.0 * range / STARTS as f64;
     let mut best = (cost(0.0), 0.0);
@@ -384,7 +411,7 @@ fn best_reading(
             best = (f, q);
         }
     }
-    // Of a joint that turns: golden-section search around the best start: the cost of one row has one minimum there.
+    // Of a joint that others follow: golden-section search around the best start: the cost of one row has one minimum there.
     let (mut low, mut high) = (best.1 - step, best.1 + step);
     let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
     for _ in 0..36 {
@@ -392,4 +419,72 @@ fn best_reading(
         if cost(a) < cost(b) { high = b } else { low = a }
     }
     0.5 * (low + high)
+}
+
+/// A reading turns its own joint by as much, and no other.
+fn turns_alone(chain: &Chain, joint: JointIndex) -> bool {
+    let terms = chain.joints().iter().enumerate();
+    let mut terms = terms.flat_map(|(j, own)| own.law.iter().map(move |term| (j, term)));
+    terms.all(|(j, (source, factor))| *source != joint || (j == joint.0 && *factor == 1.0))
+}
+
+/// c₀ + c₁ cos q + s₁ sin q + c₂ cos 2q + s₂ sin 2q: points on circles have such squared distances from others.
+struct Harmonics {
+    first: (f64, f64),
+    second: (f64, f64),
+}
+
+impl Harmonics {
+    /// From the values at five angles.
+    fn of(mut value: impl FnMut(f64) -> f64) -> Self {
+        const ANGLES: usize = 5;
+        let (mut first, mut second) = ((0.0, 0.0), (0.0, 0.0));
+        for k in 0..ANGLES {
+            let q = std::f64::consts::TAU * k as f64 / ANGLES as f64;
+            let share = 2.0 / ANGLES as f64 * value(q);
+            let ((sin, cos), (sin2, cos2)) = (q.sin_cos(), (2.0 * q).sin_cos());
+            first = (first.0 + share * cos, first.1 + share * sin);
+            second = (second.0 + share * cos2, second.1 + share * sin2);
+        }
+        Self { first, second }
+    }
+
+    /// Value without the constant, slope and curvature.
+    fn at(&self, q: f64) -> [f64; 3] {
+        let ((sin, cos), (sin2, cos2)) = (q.sin_cos(), (2.0 * q).sin_cos());
+        let ((c1, s1), (c2, s2)) = (self.first, self.second);
+        let (one, two) = (c1 * cos + s1 * sin, c2 * cos2 + s2 * sin2);
+        [
+            one + two,
+            s1 * cos - c1 * sin + 2.0 * (s2 * cos2 - c2 * sin2),
+            -one - 4.0 * two,
+        ]
+    }
+
+    /// Where it is least, in (−π, π].
+    fn least(&self) -> f64 {
+        /// Squared distances that differ by less, m², differ by rounding.
+        const ROUNDING: f64 = 1e-15;
+        let amplitude = self.first.0.hypot(self.first.1) + self.second.0.hypot(self.second.1);
+        if amplitude < ROUNDING {
+            return 0.0;
+        }
+        let step = std::f64::consts::TAU / STARTS as f64;
+        let starts = (0..STARTS).map(|k| step * (k as f64 + 1.0) - std::f64::consts::PI);
+        // Points on the axis say nothing.
+        let starts = std::iter::once(0.0).chain(starts);
+        let value = |q: f64| self.at(q)[0];
+        let start = starts.min_by(|a, b| value(*a).total_cmp(&value(*b)));
+        let start = start.unwrap_or(0.0);
+        let mut q = start;
+        for _ in 0..STEPS {
+            let [_, slope, curvature] = self.at(q);
+            let by = match curvature > 0.0 {
+                true => -slope / curvature,
+                false => -slope.signum() * 0.25 * step,
+            };
+            q = (q + by).clamp(start - step, start + step);
+        }
+        q.sin().atan2(q.cos())
+    }
 }
