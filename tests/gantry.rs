@@ -421,11 +421,24 @@ fn init_does_not_choose_between_a_sign_and_a_left_handed_tracker() {
         let said = made.stdout.split_whitespace().collect::<Vec<_>>().join(" ");
         assert!(said.contains("Nothing is corrected"), "{said}");
         assert!(said.contains("frame is left-handed"), "{said}");
-        assert!(said.contains("write `reversed: [quill]`"), "{said}");
+        // The line that it says is one that the program takes, and the joint is then right.
+        let line = "columns: {prismatic: {quill: quill_m}, reversed: [quill]}";
         assert!(
-            !dir.read("it.yaml").contains("reversed: [quill]\n"),
+            said.contains(&format!("write `{line}` in each recording")),
             "{said}"
         );
+        assert_eq!(made.code, 3, "{said}");
+        let text = dir.read("it.yaml");
+        let entries = text
+            .lines()
+            .map(|entry| match entry.strip_prefix("    file: ") {
+                Some(_) => format!("{entry}\n    {line}\n"),
+                None => format!("{entry}\n"),
+            });
+        let edited: String = entries.collect();
+        assert!(!text.contains("\n    columns:"), "{text}");
+        let dir = dir.file("edited.yaml", edited);
+        dir.calib(["check", "edited.yaml"]).expect(0);
         assert_eq!(made.code, 3, "{said}");
         // A run says the same of the remedy.
         let said = dir.calib(["check", "it.yaml"]).expect(3).stdout;
@@ -434,39 +447,39 @@ fn init_does_not_choose_between_a_sign_and_a_left_handed_tracker() {
             said.contains("First rule out `mirrored(tracker)`"),
             "{said}"
         );
+        let map = "columns: {prismatic: {quill: <column>}, reversed: [quill]}";
+        assert!(said.contains(map), "{said}");
     }
 }
 
-/// A rail with its own name beside an arm whose columns are only numbered.
+/// A lift with its own name, or a number of its own, beside an arm whose columns are only numbered.
 #[test]
-fn init_pairs_numbered_columns_beside_a_named_one() {
+fn init_pairs_numbered_columns_beside_another_one() {
     let robot = RobotModel::from_urdf_text(&urdf_of(&LIFT), "true").expect("a robot");
-    let numbered = |n: usize, seed: u64| {
-        let text = recording_of(&robot, &LIFT, None, n, seed);
-        (1..)
-            .zip(&LIFT[1..])
-            .fold(text, |text, (k, joint)| {
-                text.replacen(&format!("{}_rad", joint.0), &format!("q{k}"), 1)
+    for (lift, arm) in [("lift", "q"), ("E1", "A")] {
+        let numbered = |n: usize, seed: u64| {
+            let text = recording_of(&robot, &LIFT, None, n, seed);
+            let text = text.replacen("lift_m", lift, 1);
+            let columns = (1..).zip(&LIFT[1..]);
+            columns.fold(text, |text, (k, joint)| {
+                text.replacen(&format!("{}_rad", joint.0), &format!("{arm}{k}"), 1)
             })
-            .replacen("lift_m", "lift", 1)
-    };
-    let dir = Scratch::new()
-        .file("arm.urdf", urdf_of(&LIFT))
-        .file("poses.csv", numbered(50, 21))
-        .file("checks.csv", numbered(15, 22));
-    let files = ["arm.urdf", "poses.csv", "checks.csv"];
-    dir.calib(["init", files[0], files[1], files[2], "--out", "it.yaml"])
-        .expect(0);
-    let written = dir.read("it.yaml");
-    for (joint, column) in [
-        ("turn", "q1"),
-        ("tilt", "q2"),
-        ("elbow", "q3"),
-        ("roll", "q4"),
-    ] {
-        assert!(written.contains(&format!("{joint}: {column}")), "{written}");
+        };
+        let dir = Scratch::new()
+            .file("arm.urdf", urdf_of(&LIFT))
+            .file("poses.csv", numbered(50, 21))
+            .file("checks.csv", numbered(15, 22));
+        let files = ["arm.urdf", "poses.csv", "checks.csv"];
+        dir.calib(["init", files[0], files[1], files[2], "--out", "it.yaml"])
+            .expect(0);
+        let written = dir.read("it.yaml");
+        for (k, joint) in (1..).zip(&LIFT[1..]) {
+            let pair = format!("{}: {arm}{k}", joint.0);
+            assert!(written.contains(&pair), "{pair}: {written}");
+        }
+        assert!(written.contains(&format!("lift: {lift}")), "{written}");
+        let report = dir.calib(["run", "it.yaml", "--out", "out"]);
+        assert!(report.code < 2, "{}", report.stderr);
+        assert!(held_out(&dir.json("out/report.json")) < 1e-3);
     }
-    let report = dir.calib(["run", "it.yaml", "--out", "out"]);
-    assert!(report.code < 2, "{}", report.stderr);
-    assert!(held_out(&dir.json("out/report.json")) < 1e-3);
 }

@@ -10,7 +10,7 @@ use calib_urdf::{Joint, LinkId, RobotModel, doubt};
 
 use crate::correct;
 use crate::error::InitError;
-use crate::fact::{About, CERTAIN, Fact, Place, Residuals, Rival};
+use crate::fact::{About, CERTAIN, Fact, Place, Residuals, Reversed, Rival};
 use crate::links::{Assigned, Choice, Scene, is_of_links};
 use crate::mistake::Mistake;
 use crate::robot;
@@ -227,6 +227,7 @@ pub fn next_correction(
             next.facts.push(Fact::new(
                 Place::Recordings,
                 About::SignOrMirror {
+                    joints: context.reversed(correction),
                     mistakes: context.in_words(correction),
                     residuals,
                     equivalent: others,
@@ -319,6 +320,29 @@ impl Context<'_> {
         let source = self.drafts.first().map(|d| &self.sources[d.source]);
         let of = |s: &Scoped| correct::mistake(self.model, source, self.bodies, &s.hypothesis);
         correction.iter().map(of).collect()
+    }
+
+    /// The joints that a correction reverses, each with its column.
+    fn reversed(&self, correction: &Correction) -> Vec<Reversed> {
+        let Some(draft) = self.drafts.first() else {
+            return Vec::new();
+        };
+        let source = &self.sources[draft.log.unwrap_or(draft.source)];
+        let of = |scoped: &Scoped| match scoped.hypothesis {
+            Hypothesis::Sign { joint } => {
+                let turns = self.model.joints()[joint.0].kind.turns();
+                let joint = self.model.joints()[joint.0].name.clone();
+                let column = correct::column(source, &joint);
+                let column = column.unwrap_or_else(|| joint.clone());
+                Some(Reversed {
+                    joint,
+                    column,
+                    turns,
+                })
+            }
+            _ => None,
+        };
+        correction.iter().filter_map(of).collect()
     }
 
     /// The best pattern of signs as the correction; `None` where no column map can hold it.

@@ -298,6 +298,13 @@ fn renamed(source: &Source, map: &ColumnMap, columns: &[String], unit: &str) -> 
     Some(renamed)
 }
 
+/// The column of a joint in a file.
+#[must_use]
+pub fn column(source: &Source, joint: &str) -> Option<String> {
+    let map = source.columns.clone().unwrap_or_default();
+    column_of(source, &map, joint)
+}
+
 /// The column of a joint, by the map or by its own name.
 fn column_of(source: &Source, map: &ColumnMap, joint: &str) -> Option<String> {
     let mapped = map.joints.get(joint).or_else(|| map.prismatic.get(joint));

@@ -68,6 +68,17 @@ pub struct Residuals {
     pub over: Option<f64>,
 }
 
+/// A joint that may count the other way.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize)]
+pub struct Reversed {
+    /// Its name.
+    pub joint: String,
+    /// Its column.
+    pub column: String,
+    /// Whether it turns.
+    pub turns: bool,
+}
+
 /// Another link, and how much worse it explains a body's motion.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Rival {
@@ -325,7 +336,9 @@ pub enum About {
     /// Joints that count the other way, or a left-handed tracker: a robot that is symmetric about a plane moves the same with either, so nothing is
     /// corrected.
     SignOrMirror {
-        /// The joints.
+        /// The joints, each with its column.
+        joints: Vec<Reversed>,
+        /// The same as mistakes.
         mistakes: Vec<Mistake>,
         /// What either explains.
         residuals: Residuals,

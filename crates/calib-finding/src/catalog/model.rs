@@ -5,7 +5,7 @@ super::topic! {
     JOINT_SIGN = "joint-sign" {
         "": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} with the opposite sign of joint `{joint}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
-            "Negate this joint's column in the profile: `columns: {joints: {{joint}: <column>}, reversed: [{joint}]}`, or reverse its axis in the URDF: `<axis xyz=\"{axis}\"/>`.[[ First rule out {equivalent:code}: only if joint `{joint}`, moved by a positive amount, moves against its axis in the URDF is its sign wrong.]]";
+            "Negate this joint's column in the profile: `columns: {{map}: {{joint}: <column>}, reversed: [{joint}]}`, or reverse its axis in the URDF: `<axis xyz=\"{axis}\"/>`.[[ First rule out {equivalent:code}: only if joint `{joint}`, moved by a positive amount, moves against its axis in the URDF is its sign wrong.]]";
     }
     /// A joint moves along another axis than the URDF has.
     JOINT_AXIS = "joint-axis" {
@@ -17,7 +17,7 @@ super::topic! {
     JOINT_ORDER = "joint-order" {
         "": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} with joints `{joint}` and `{other}` exchanged[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
-            "Exchange the names of these columns in the header, or map them: `columns: {joints: {{joint}: <column of {other}>, {other}: <column of {joint}>}}`.";
+            "Exchange the names of these columns in the header, or map them: `columns: {{map}: {{joint}: <column of {other}>, {other}: <column of {joint}>}}`.";
     }
     /// The zero of a joint is off by a multiple of 90°, or a joint that never moved stood elsewhere than it was read.
     JOINT_OFFSET = "joint-offset" {

@@ -3,8 +3,9 @@
 use calib_finding::{Unit, number};
 
 use super::{length_unit, mm, plural};
-use crate::fact::{About, Residuals};
+use crate::fact::{About, Residuals, Reversed};
 use crate::mistake::Mistake;
+use crate::yaml;
 
 /// A mistake that was found, with what was done about it.
 pub(super) fn sentence(about: &About) -> String {
@@ -25,10 +26,12 @@ pub(super) fn sentence(about: &About) -> String {
             not_distinguished(equivalent)
         ),
         About::SignOrMirror {
+            joints,
             mistakes,
             residuals,
             equivalent,
         } => sign_or_mirror(
+            joints,
             mistakes,
             &improvement(residuals),
             &not_distinguished(equivalent),
@@ -137,17 +140,29 @@ fn corrected(mistake: &Mistake, residuals: &Residuals, equivalent: &[Vec<Mistake
 }
 
 /// Joints that count the other way, or a left-handed tracker: what decides it, and what to do then.
-fn sign_or_mirror(mistakes: &[Mistake], improvement: &str, others: &str) -> String {
-    let joint = |mistake: &Mistake| match mistake {
-        Mistake::Sign { joint } => Some(joint.clone()),
-        _ => None,
-    };
-    let joints: Vec<String> = mistakes.iter().filter_map(joint).collect();
+fn sign_or_mirror(
+    joints: &[Reversed],
+    mistakes: &[Mistake],
+    improvement: &str,
+    others: &str,
+) -> String {
     let all: Vec<String> = mistakes.iter().map(found).collect();
-    let first = joints.first().map_or("", String::as_str);
+    let names: Vec<&str> = joints.iter().map(|r| r.joint.as_str()).collect();
+    let of_kind = |key: &str, turns: bool| {
+        let own = joints.iter().filter(|r| r.turns == turns);
+        let pairs = own.map(|r| format!("{}: {}", yaml::text(&r.joint), yaml::text(&r.column)));
+        let pairs: Vec<String> = pairs.collect();
+        (!pairs.is_empty()).then(|| format!("{key}: {{{}}}, ", pairs.join(", ")))
+    };
+    let maps = [of_kind("joints", true), of_kind("prismatic", false)];
+    let map = format!(
+        "columns: {{{}reversed: [{}]}}",
+        maps.into_iter().flatten().collect::<String>(),
+        names.join(", ")
+    );
     format!(
-        "{} It explains the recordings ({improvement}).{others} Nothing is corrected, because the real robot moves differently in these cases. Move `{first}` by a positive amount: if it moves against its axis in the URDF, write `reversed: [{}]` below `columns`; if it moves along it, correct the axes of the tracker's export.",
+        "{} It explains the recordings ({improvement}).{others} Nothing is corrected, because the real robot moves differently in these cases. Move `{}` by a positive amount: if it moves against its axis in the URDF, write `{map}` in each recording; if it moves along it, another of these is the mistake. Where no joint is reversed, correct the axes of the tracker's export.",
         all.join(" "),
-        joints.join(", ")
+        names.first().copied().unwrap_or_default()
     )
 }

@@ -88,10 +88,15 @@ fn of_hypothesis(layout: &Layout<'_>, outcome: &Outcome, scoped: &Scoped) -> Fin
         Finding::new(id, Subject::joint(name)).with("joint", Fact::name(name))
     };
     let other = |joint| Fact::name(layout.joint(joint));
+    // Where a column map has the joint.
+    let map_of = |joint: JointIndex| match layout.data.chain.turns(joint.0) {
+        Some(false) => Fact::choice("prismatic"),
+        _ => Fact::choice("joints"),
+    };
     match scoped.hypothesis {
-        Hypothesis::Sign { joint } => {
-            of_joint(catalog::JOINT_SIGN, joint).with_some("axis", reversed_axis(layout, joint))
-        }
+        Hypothesis::Sign { joint } => of_joint(catalog::JOINT_SIGN, joint)
+            .with("map", map_of(joint))
+            .with_some("axis", reversed_axis(layout, joint)),
         Hypothesis::Axis { joint, along } => {
             let law = &layout.data.chain.joints()[joint.0].law;
             let own = law.iter().any(|(source, _)| *source == joint);
@@ -100,9 +105,9 @@ fn of_hypothesis(layout: &Layout<'_>, outcome: &Outcome, scoped: &Scoped) -> Fin
                 .with("axis", Fact::name(codes::axis(&along.vector())))
                 .with_some("follows", follows.map(|(source, _)| other(*source)))
         }
-        Hypothesis::Exchange { first, second } => {
-            of_joint(catalog::JOINT_ORDER, first).with("other", other(second))
-        }
+        Hypothesis::Exchange { first, second } => of_joint(catalog::JOINT_ORDER, first)
+            .with("map", map_of(first))
+            .with("other", other(second)),
         Hypothesis::Offset { joint, turns } => Finding::of_kind(
             catalog::JOINT_OFFSET,
             "turned",
