@@ -52,6 +52,39 @@ fn a_sweep_whose_own_column_is_stuck_is_named() {
     }
 }
 
+/// A joint that did stand still, where its column says: nothing is named.
+#[test]
+fn a_joint_that_did_stand_still_is_not_named() {
+    let ranges = [
+        "[-70, 170]",
+        "[-100, 20]",
+        "[-20, 120]",
+        "[-90, 90]",
+        "[-100, 100]",
+    ];
+    for (seed, (joint, range)) in (101..).zip(JOINTS.into_iter().zip(ranges)) {
+        for markers in [FOUR, ONE] {
+            let moves = format!("{joint}_deg: {range}");
+            // The first of a list has no comma before it.
+            let own = match joint {
+                "waist" => format!("{moves}, "),
+                _ => format!(", {moves}"),
+            };
+            let still = format!("hold: {{{joint}_deg: 15}}, poses: 40");
+            let setting = Setting::new(Design::Random(40), markers, seed);
+            let dir = setting.simulated_with(&[(&own, ""), ("poses: 40", &still)]);
+            let dir = column(dir, &setting.tables(), &format!("{joint}_deg"), |_| 15.0);
+            let found = findings(&dir);
+            let wrong: Vec<_> = found.iter().filter(|f| f["severity"] == "error").collect();
+            assert!(
+                wrong.is_empty(),
+                "{joint}, {} markers: {wrong:#?}",
+                markers.len()
+            );
+        }
+    }
+}
+
 /// Only the held-out recording is wrong: by so little, for the last joints, that errors of a nominal robot would explain it.
 #[test]
 fn a_column_that_is_stuck_in_the_validation_alone_is_named() {
