@@ -19,7 +19,7 @@ use super::ranking::{Ranking, distinct, few_samples, ratio};
 use super::readings::{WrongReadings, wrong_readings};
 use super::scan::{Scan, Score, Scored};
 use super::screen::{Screened, screen};
-use super::swept::moved_after_all;
+use super::swept::{at_rest, moved_after_all};
 use super::thinning::thinned;
 use super::twin::twin;
 
@@ -148,7 +148,10 @@ fn decided(asked: &Asked<'_>, outcome: &mut Outcome) -> Correction {
         outcome.invisible = invisible(data, ranking, screened, options);
     }
     outcome.decision = match decide(asked, outcome) {
-        Decision::Named(named) => Decision::Named(moved_after_all(named, data, screened)),
+        Decision::Named(named) => Decision::Named(match at_rest(&named, data, screened) {
+            Some(other) => asked.with_expected(asked.name(&other)),
+            None => moved_after_all(named, data, screened),
+        }),
         other => other,
     };
     match &outcome.decision {

@@ -61,13 +61,22 @@ impl Asked<'_> {
                 .filter(|s| s.scoped != best.scoped && !equivalent.contains(&s.scoped))
         };
         let times = |s: &Scored| ratio(s.score.score, best.score.score);
+        // A frame of its own takes up errors of the robot, which one place of a joint does not.
+        let is_frame = matches!(
+            best.scoped.hypothesis,
+            Hypothesis::TrackerMoved | Hypothesis::Remounted { .. }
+        );
+        let nearly = |s: &Scored| match s.scoped.hypothesis {
+            Hypothesis::StoodAt { .. } if is_frame => options.name_ratio,
+            _ => options.runner_up_ratio,
+        };
         let corrected = apply(&best.scoped, self.data);
         let mirrored = self.like_a_mirror(&best.scoped, &twin);
         Named {
             correction: vec![best.scoped],
             alternatives: others()
+                .filter(|s| times(s) < nearly(s))
                 .map(|s| (vec![s.scoped], times(s)))
-                .take_while(|s| s.1 < options.runner_up_ratio)
                 .collect(),
             evidence: Evidence {
                 none: ranking.none.rms,

@@ -130,7 +130,12 @@ const STARTS: usize = 12;
 const STEPS: usize = 14;
 
 /// The one place where a joint stood that explains its rows best, by golden-section search.
-fn stood_at(scan: &Scan<'_>, scoped: Scoped, joint: JointIndex, middle: f64) -> (Scored, f64) {
+pub(super) fn stood_at(
+    scan: &Scan<'_>,
+    scoped: Scoped,
+    joint: JointIndex,
+    middle: f64,
+) -> (Scored, f64) {
     let at = |value: f64| {
         let scoped = Scoped {
             hypothesis: Hypothesis::StoodAt { joint, value },

@@ -1,15 +1,16 @@
-//! A joint without a column: most rows say where it stood, and those that it was swept in look like outliers beside them.
+//! Joints without a column, or with one that never changes, that a first name does not do justice to: most rows say where such a joint stood, and those that
+//! it was swept in look like outliers beside them; other readings for it can be stated in many ways.
 
 use std::collections::BTreeSet;
 
 use super::correct::{correct, empty_rows, open_rows, stuck_at};
 use super::data::Data;
 use super::hypothesis::{Hypothesis, Scoped};
-use super::ids::{JointIndex, SampleIndex};
+use super::ids::SampleIndex;
 use super::outcome::{Evidence, Named};
 use super::ranking::ratio;
-use super::scan::Scan;
-use super::score::penalized;
+use super::scan::{Scan, Scored};
+use super::score::{penalized, stood_at};
 use super::special;
 
 /// Rows that a place for all of them leaves as outliers before readings of their own are asked.
@@ -17,7 +18,7 @@ const SOME_ROWS: usize = 3;
 /// Readings of their own leave as little of all samples, to this factor, as one place leaves without its outliers.
 const AS_LITTLE: f64 = 1.5;
 
-/// Readings of their own explain a joint that never changed better than another zero where they leave so many times less.
+/// Readings of their own explain a joint that never changed better than one place where they leave so many times less.
 const CLEARLY: f64 = 1.2;
 
 /// A joint without a column that stood where most rows have it, and moved in those that were taken for outliers beside it: in a
@@ -26,12 +27,8 @@ pub(super) fn moved_after_all(mut named: Named, data: &Data, screened: &[SampleI
     let [scoped] = named.correction[..] else {
         return named;
     };
-    let joint = match scoped.hypothesis {
-        Hypothesis::StoodAt { joint, .. } => joint,
-        Hypothesis::Offset { joint, .. } => {
-            return moved_though_stuck(named, data, screened, joint);
-        }
-        _ => return named,
+    let Hypothesis::StoodAt { joint, .. } = scoped.hypothesis else {
+        return named;
     };
     let empty = empty_rows(scoped.scope, joint, data);
     let rows: BTreeSet<usize> = screened.iter().map(|sample| sample.row).collect();
@@ -42,53 +39,50 @@ pub(super) fn moved_after_all(mut named: Named, data: &Data, screened: &[SampleI
     let filled = special::estimated_beside(correct(&scoped, data), joint, &empty, screened);
     let score = penalized(&scan, empty.len(), scan.fit_corrected(&filled).score);
     if score.rms <= AS_LITTLE * named.evidence.best {
-        let hypothesis = Hypothesis::MissingColumn { joint };
-        rename(
-            &mut named,
-            Scoped {
-                hypothesis,
-                ..scoped
-            },
-            scan.none().rms,
-            score.rms,
-        );
+        let none = scan.none().rms;
+        named.evidence = Evidence {
+            none,
+            best: score.rms,
+            next: None,
+            ratio: ratio(none, score.rms),
+        };
+        named.correction = vec![Scoped {
+            hypothesis: Hypothesis::MissingColumn { joint },
+            ..scoped
+        }];
+        (named.equivalent, named.alternatives) = (Vec::new(), Vec::new());
     }
     named
 }
 
-/// Another zero of a joint whose readings never change there: if readings of its own explain clearly more, it moved in spite of them.
-fn moved_though_stuck(
-    mut named: Named,
-    data: &Data,
-    screened: &[SampleIndex],
-    joint: JointIndex,
-) -> Named {
+/// A name that only states other readings for a joint whose readings never change in its scope: the joint stood elsewhere, or moved in spite of them.
+pub(super) fn at_rest(named: &Named, data: &Data, screened: &[SampleIndex]) -> Option<Scored> {
+    let [Scoped { hypothesis, scope }] = named.correction[..] else {
+        return None;
+    };
+    let joint = match hypothesis {
+        Hypothesis::Sign { joint }
+        | Hypothesis::Offset { joint, .. }
+        | Hypothesis::Unit { joint, .. } => joint,
+        Hypothesis::Coupling { joint, source, .. } => {
+            stuck_at(scope, source, data)?;
+            joint
+        }
+        _ => return None,
+    };
+    let read = stuck_at(scope, joint, data)?;
     let scoped = Scoped {
         hypothesis: Hypothesis::MissingColumn { joint },
-        scope: named.correction[0].scope,
+        scope,
     };
-    if stuck_at(scoped.scope, joint, data).is_none() {
-        return named;
-    }
     let scan = Scan::new(data, screened);
-    let rows = open_rows(scoped.scope, joint, data).len();
+    let (stood, _) = stood_at(&scan, scoped, joint, read);
+    let rows = open_rows(scope, joint, data).len();
     let filled = special::apply(&scoped, data);
     let score = penalized(&scan, rows, scan.fit_corrected(&filled).score);
-    if CLEARLY * score.rms < named.evidence.best {
-        let none = named.evidence.none;
-        rename(&mut named, scoped, none, score.rms);
+    let best = named.evidence.best;
+    if CLEARLY * score.rms < best.min(stood.score.rms) {
+        return Some(Scored { scoped, score });
     }
-    named
-}
-
-/// Another name, with what it leaves, m.
-fn rename(named: &mut Named, scoped: Scoped, none: f64, best: f64) {
-    named.evidence = Evidence {
-        none,
-        best,
-        next: None,
-        ratio: ratio(none, best),
-    };
-    named.correction = vec![scoped];
-    (named.equivalent, named.alternatives) = (Vec::new(), Vec::new());
+    (stood.score.rms <= best).then_some(stood)
 }
