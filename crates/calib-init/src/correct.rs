@@ -1,6 +1,8 @@
 //! Mistakes in tables, corrected in the profile: columns exchanged, negated, or read in another unit. The tables themselves are never changed.
 
-use calib_checks::structural::{BodyIndex, Hypothesis, Length, Scoped, UnitMistake};
+use calib_checks::structural::{
+    BodyIndex, Chain, ColumnOrder, Hypothesis, Length, Scoped, UnitMistake,
+};
 use calib_recording::{AngleUnit, ColumnMap, LengthUnit};
 use calib_urdf::{JointKind, RobotModel, doubt};
 
@@ -26,6 +28,9 @@ pub fn mistake(
         Hypothesis::Exchange { first, second } => Mistake::Exchange {
             first: joint(first),
             second: joint(second),
+        },
+        Hypothesis::Order { order } => Mistake::Order {
+            columns: moved(model, order),
         },
         Hypothesis::Unit { joint: j, mistake } => Mistake::Unit {
             joint: Some(joint(j)),
@@ -67,6 +72,19 @@ pub fn mistake(
         },
         _ => Mistake::Other,
     }
+}
+
+/// Each joint with the name of the one in whose column its values are, where that is another one.
+fn moved(model: &RobotModel, order: ColumnOrder) -> Vec<(String, String)> {
+    let Ok(chain) = Chain::from_model(model) else {
+        return Vec::new();
+    };
+    let name = |joint: usize| model.joints()[joint].name.clone();
+    let columns = order.columns(&chain).into_iter().enumerate();
+    let moved = columns.filter(|(joint, column)| column.0 != *joint);
+    moved
+        .map(|(joint, column)| (name(joint), name(column.0)))
+        .collect()
 }
 
 /// Lengths that are too small for a robot which is larger than robots are: its URDF has another unit.
@@ -139,6 +157,15 @@ fn new_map(model: &RobotModel, source: &Source, hypothesis: &Hypothesis) -> Opti
             }
             set(model, &mut map, &a, of_b);
             set(model, &mut map, &b, of_a);
+        }
+        Hypothesis::Order { order } => {
+            let columns = moved(model, order).into_iter();
+            let columns: Option<Vec<(String, String)>> = columns
+                .map(|(joint, of)| Some((joint, column_of(source, &map, &of)?)))
+                .collect();
+            for (joint, column) in columns? {
+                set(model, &mut map, &joint, column);
+            }
         }
         Hypothesis::Unit { joint: j, mistake } => {
             let column = column_of(source, &map, &joint(j))?;

@@ -18,6 +18,11 @@ pub enum Mistake {
         /// Name of the other.
         second: String,
     },
+    /// Several columns are in another order than their names.
+    Order {
+        /// Each joint with the name of the one in whose column its values are.
+        columns: Vec<(String, String)>,
+    },
     /// The unit of a joint's column, or of all columns of its kind.
     Unit {
         /// The joint; all where absent.

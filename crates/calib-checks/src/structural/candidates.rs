@@ -9,6 +9,7 @@ use super::hypothesis::{
     Direction, Hypothesis, PoseMistake, QuarterTurns, Scope, TRACKER_UNITS, UnitMistake,
 };
 use super::ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex};
+use super::order::ColumnOrder;
 
 /// A column whose values differ by less (rad or m) carries no information about its own sign or unit.
 const MOVES: f64 = 1e-6;
@@ -99,6 +100,9 @@ fn of_readings(data: &Data, scopes: &[Scope], list: &mut Vec<Candidate>) {
                 add(Hypothesis::Exchange { first, second });
             }
         }
+    }
+    for order in ColumnOrder::of(data) {
+        add(Hypothesis::Order { order });
     }
     for &joint in &joints {
         for &source in &joints {

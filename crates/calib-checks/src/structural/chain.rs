@@ -41,6 +41,8 @@ pub struct Chain {
     pub(crate) joints: Vec<ChainJoint>,
     /// Joints sorted so that a parent comes before its children.
     order: Vec<usize>,
+    /// The place of each joint in the alphabetical order of names; in its own order where there are none.
+    pub(crate) alphabet: Vec<usize>,
 }
 
 /// The joints of a chain do not form a tree.
@@ -97,6 +99,7 @@ impl Chain {
         }
         Ok(Self {
             links,
+            alphabet: (0..joints.len()).collect(),
             joints,
             order,
         })
@@ -121,7 +124,13 @@ impl Chain {
             law: vec![(JointIndex(joint.law.source.index()), joint.law.multiplier)],
             offset: joint.law.offset,
         });
-        Self::new(model.links().len(), joints.collect())
+        let mut chain = Self::new(model.links().len(), joints.collect())?;
+        let mut sorted: Vec<usize> = (0..chain.joints.len()).collect();
+        sorted.sort_by_key(|j| &model.joints()[*j].name);
+        for (place, joint) in sorted.into_iter().enumerate() {
+            chain.alphabet[joint] = place;
+        }
+        Ok(chain)
     }
 
     /// The same chain with a declared coupling: `q_joint += factor · reading_source`.

@@ -19,6 +19,13 @@ pub(crate) fn correct(scoped: &Scoped, data: &Data) -> Data {
         .collect();
     match *h {
         Hypothesis::RowShift { rows } => shift(&mut corrected, data, &inside, rows),
+        Hypothesis::Order { order } => {
+            let columns = order.columns(&data.chain);
+            for i in (0..inside.len()).filter(|&i| inside[i]) {
+                let row = columns.iter().map(|column| data.readings[i][column.0]);
+                corrected.readings[i] = row.collect();
+            }
+        }
         Hypothesis::WrongLink { body, link } => corrected.bodies[body.0].link = link,
         Hypothesis::Axis { joint, along } => {
             corrected.chain = corrected.chain.with_axis(joint, along.vector());

@@ -7,6 +7,7 @@ use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, Unit, UnitQuaternio
 use serde::Serialize;
 
 use super::ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex};
+use super::order::ColumnOrder;
 use super::rotation::cube;
 
 /// A unit that was misread in the column of a joint: what the values are, and what they were read as.
@@ -181,6 +182,11 @@ pub enum Hypothesis {
         first: JointIndex,
         /// The larger index.
         second: JointIndex,
+    },
+    /// Several columns are in another order than their names.
+    Order {
+        /// Which.
+        order: ColumnOrder,
     },
     /// The column's unit was misread.
     Unit {

@@ -69,6 +69,7 @@ mod moments;
 mod moved;
 mod naming;
 mod nonlinear;
+mod order;
 mod outcome;
 mod ranking;
 mod readings;
@@ -97,6 +98,7 @@ pub use hypothesis::{
 pub use ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex, SampleIndex};
 pub use jump::{Jump, Moved, Size};
 pub use likelihood::{KnownNoise, log_odds};
+pub use order::{ColumnOrder, Columns};
 pub use outcome::{
     Allowing, Correction, Decision, Design, Evidence, Expected, Named, Options, Outcome,
 };

@@ -28,7 +28,7 @@ impl Scan<'_> {
     pub(super) fn moved_sums(&self, h: &Hypothesis, scopes: &[Scope]) -> Option<Vec<Moments>> {
         match *h {
             Hypothesis::RowShift { rows } => Some(self.shifted_sums(rows, scopes)),
-            Hypothesis::Units { .. } => {
+            Hypothesis::Units { .. } | Hypothesis::Order { .. } => {
                 let bodies = &self.data.bodies;
                 let links = bodies.iter().map(|body| Some(body.link)).collect();
                 Some(self.walked_sums(h, links, scopes))
@@ -68,11 +68,19 @@ impl Scan<'_> {
         let moved: Vec<LinkIndex> = links.iter().copied().flatten().collect();
         let mut walk = Walk::new(&self.data.chain, &moved);
         let mut row = Vec::new();
+        let columns = match *h {
+            Hypothesis::Order { order } => Some(order.columns(&self.data.chain)),
+            _ => None,
+        };
         self.sums_with(
             scopes,
             |body| links[body].is_some(),
             |i, poses| {
                 self.corrected_units(h, i, &mut row);
+                if let Some(columns) = &columns {
+                    row.clear();
+                    row.extend(columns.iter().map(|column| self.row(i)[column.0]));
+                }
                 walk.go(&self.data.chain, &row);
                 for (pose, link) in poses.iter_mut().zip(&links) {
                     *pose = link.map_or(*pose, |link| walk.root_from_link[link.0]);

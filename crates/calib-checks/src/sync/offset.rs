@@ -21,7 +21,8 @@ pub struct OffsetSettings {
     /// Half of the time over which a turn is measured, s. Default 0.05: long enough for the noise of a marker cluster,
     /// short against a robot's motion.
     pub half_chord: f64,
-    /// A second peak this high, in units of the first, makes the answer ambiguous. Default 0.9.
+    /// A second peak this high, in units of the first, makes the answer ambiguous where it leaves less than four times as much of the motion
+    /// unexplained. Default 0.9.
     pub ambiguous: f64,
     /// Smallest correlation that counts as the same motion. Default 0.6.
     pub min_correlation: f64,
@@ -114,6 +115,8 @@ const MIN_DEVIATION: f64 = 0.02;
 const MIN_SAMPLES: usize = 50;
 /// Longest gap, in units of the median step, over which orientations are interpolated.
 const MAX_GAP: f64 = 5.0;
+/// A second peak that leaves at least this many times as much of the squared speed is another motion.
+const CLEARLY: f64 = 4.0;
 /// Refinement steps; three are usual.
 const MAX_STEPS: usize = 30;
 /// Longest grid of the correlation, samples: an hour at 100 Hz is thinned.
@@ -216,10 +219,11 @@ pub fn clock_offset(
             needed: settings.min_correlation,
         };
     }
-    if let Some(second) = peaks
-        .get(1)
-        .filter(|second| second.height > settings.ambiguous * first.height)
-    {
+    // Postures one after the other at equal intervals correlate when moved by some of them; what is left then is many times as much.
+    let left = |peak: &Peak| 1.0 - peak.height * peak.height;
+    if let Some(second) = peaks.get(1).filter(|second| {
+        second.height > settings.ambiguous * first.height && left(second) < CLEARLY * left(&first)
+    }) {
         return OffsetOutcome::Ambiguous {
             first: offset(&first),
             second: offset(second),

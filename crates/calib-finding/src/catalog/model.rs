@@ -13,11 +13,14 @@ super::topic! {
             "The recordings fit the nominal robot to {none} rms, but to {best} with the axis of joint `{joint}`[[, which follows `{follows}`,]] along `{axis}`[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Compare the axis in the URDF with the robot: `<axis xyz=\"{axis}\"/>` in the frame of joint `{joint}`; without this element it is `1 0 0`.[[ A reversed axis of a joint that follows another one is a `multiplier` in `<mimic joint=\"{follows}\"/>` of the other sign.]]";
     }
-    /// Two joint columns are exchanged.
+    /// Joint columns hold the values of other joints.
     JOINT_ORDER = "joint-order" {
-        "": Error,
+        "two": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} with joints `{joint}` and `{other}` exchanged[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Exchange the names of these columns in the header, or map them: `columns: {{map}: {{joint}: <column of {other}>, {other}: <column of {joint}>}}`.";
+        "several": Error,
+            "The recordings fit the nominal robot to {none} rms, but to {best} with {count} joint columns in another order[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "Correct the names in the header, or map each joint to the column that holds its values: `columns: {{map}: {{entries}}}`.";
     }
     /// The zero of a joint is off by a multiple of 90°, or a joint that never moved stood elsewhere than it was read.
     JOINT_OFFSET = "joint-offset" {

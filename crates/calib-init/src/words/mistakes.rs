@@ -47,6 +47,16 @@ fn found(mistake: &Mistake) -> String {
         Mistake::Exchange { first, second } => {
             format!("The columns of `{first}` and `{second}` are exchanged.")
         }
+        Mistake::Order { columns } => {
+            let of = columns
+                .iter()
+                .map(|(joint, column)| format!("`{joint}` in `{column}`"));
+            let of: Vec<String> = of.collect();
+            format!(
+                "Joint columns are in another order: the values of {}.",
+                of.join(", ")
+            )
+        }
         Mistake::Unit {
             joint: Some(joint),
             unit,

@@ -7,7 +7,6 @@
 
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_geometry::mean::chordal_mean;
-use calib_profile::Usage;
 use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
 
 use crate::prepare::inputs::{Inputs, Loaded};
@@ -20,14 +19,13 @@ const AT_REST: f64 = 5e-3;
 /// Measured twice, a place differs by more than this, m: what is closer was copied and rounded.
 const COPIED: f64 = 1e-6;
 
-/// Merges the frames of every posture in the recordings that are fitted; a finding for each recording that had some.
+/// Merges the frames of every posture; a finding for each recording that had some.
 pub fn merge(inputs: &mut Inputs) -> Vec<Finding> {
     let mut findings = Vec::new();
     let mut moved = Vec::new();
     let scales = scales(inputs);
     for loaded in inputs.recordings.values_mut() {
-        let fitted = loaded.spec.usage != Usage::Validation;
-        if !fitted || loaded.alignment.is_some() || !loaded.shapes.is_empty() {
+        if loaded.alignment.is_some() || !loaded.shapes.is_empty() {
             continue;
         }
         let groups = postures(loaded, &scales);

@@ -1,7 +1,8 @@
 //! Short codes of hypotheses, for the values of findings: `sign(elbow)`, `exchange(elbow, wrist)@sweep`.
 
 use calib_checks::structural::{
-    Correction, Hypothesis, Length, PoseMistake, QuarterTurns, Scope, Scoped, UnitMistake,
+    ColumnOrder, Correction, Hypothesis, Length, PoseMistake, QuarterTurns, Scope, Scoped,
+    UnitMistake,
 };
 
 use nalgebra::Vector3;
@@ -32,6 +33,20 @@ fn of_hypothesis(layout: &Layout<'_>, hypothesis: &Hypothesis) -> String {
         Hypothesis::Exchange { first, second } => {
             format!("exchange({}, {})", joint(first), joint(second))
         }
+        Hypothesis::Order { order } => match order {
+            ColumnOrder::Reversed(_) => "order(reversed)".to_owned(),
+            ColumnOrder::Before(_) => "order(one before)".to_owned(),
+            ColumnOrder::After(_) => "order(one after)".to_owned(),
+            ColumnOrder::Alphabetical(_) => "order(values by name)".to_owned(),
+            ColumnOrder::Robots(_) => "order(names by name)".to_owned(),
+            ColumnOrder::Limbs { first, second } => {
+                format!(
+                    "order({} and behind, {} and behind)",
+                    joint(first),
+                    joint(second)
+                )
+            }
+        },
         Hypothesis::Unit { joint: j, mistake } => format!("unit({}, {})", joint(j), unit(mistake)),
         Hypothesis::Units { mistake } => format!("unit(all, {})", unit(mistake)),
         Hypothesis::Coupling {

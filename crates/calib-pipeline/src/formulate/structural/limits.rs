@@ -214,6 +214,7 @@ fn invisible(layout: &Layout<'_>, outcome: &Outcome) -> Option<Finding> {
             h,
             Hypothesis::Sign { .. }
                 | Hypothesis::Exchange { .. }
+                | Hypothesis::Order { .. }
                 | Hypothesis::Unit { .. }
                 | Hypothesis::Coupling { .. }
         )

@@ -1,8 +1,8 @@
 //! A named mistake as findings: one for each correction, with the evidence and what is not distinguishable from it.
 
 use calib_checks::structural::{
-    Correction, Hypothesis, JointIndex, Length, Named, Outcome, PoseMistake, RecordingIndex,
-    Scoped, UnitMistake,
+    ColumnOrder, Correction, Hypothesis, JointIndex, Length, Named, Outcome, PoseMistake,
+    RecordingIndex, Scoped, UnitMistake,
 };
 use calib_finding::{About, Fact, Finding, Id, Subject, catalog};
 
@@ -81,6 +81,36 @@ pub(super) fn with_evidence(
         )
 }
 
+/// Several columns in another order.
+fn several(
+    layout: &Layout<'_>,
+    order: ColumnOrder,
+    map_of: impl Fn(JointIndex) -> Fact,
+) -> Finding {
+    let columns = order.columns(&layout.data.chain).into_iter().enumerate();
+    let moved: Vec<(JointIndex, JointIndex)> = columns
+        .map(|(joint, column)| (JointIndex(joint), column))
+        .filter(|(joint, column)| joint != column)
+        .collect();
+    let of = |(joint, column): &(JointIndex, JointIndex)| {
+        format!(
+            "{}: <column of {}>",
+            layout.joint(*joint),
+            layout.joint(*column)
+        )
+    };
+    let entries: Vec<String> = moved.iter().map(of).collect();
+    let first = moved.first().map_or(JointIndex(0), |m| m.0);
+    Finding::of_kind(
+        catalog::JOINT_ORDER,
+        "several",
+        Subject::joint(layout.joint(first)),
+    )
+    .with("map", map_of(first))
+    .with("count", Fact::count(moved.len()))
+    .with("entries", Fact::name(entries.join(", ")))
+}
+
 /// Id, subject and values of one hypothesis.
 fn of_hypothesis(layout: &Layout<'_>, outcome: &Outcome, scoped: &Scoped) -> Finding {
     let of_joint = |id: Id, joint: JointIndex| {
@@ -105,9 +135,14 @@ fn of_hypothesis(layout: &Layout<'_>, outcome: &Outcome, scoped: &Scoped) -> Fin
                 .with("axis", Fact::name(codes::axis(&along.vector())))
                 .with_some("follows", follows.map(|(source, _)| other(*source)))
         }
-        Hypothesis::Exchange { first, second } => of_joint(catalog::JOINT_ORDER, first)
-            .with("map", map_of(first))
-            .with("other", other(second)),
+        Hypothesis::Exchange { first, second } => {
+            let subject = Subject::joint(layout.joint(first));
+            Finding::of_kind(catalog::JOINT_ORDER, "two", subject)
+                .with("joint", Fact::name(layout.joint(first)))
+                .with("map", map_of(first))
+                .with("other", other(second))
+        }
+        Hypothesis::Order { order } => several(layout, order, map_of),
         Hypothesis::Offset { joint, turns } => Finding::of_kind(
             catalog::JOINT_OFFSET,
             "turned",
