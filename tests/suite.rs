@@ -55,6 +55,7 @@ mod screens;
 mod selection;
 mod shown;
 mod sizes;
+mod slips;
 mod streams;
 mod structural;
 mod stuck;

@@ -6,6 +6,7 @@
 //!                                and the angle θ between these normals, which a zero offset moves
 //! ```
 //!
+//! Joints that slide have directions only. One along an axis is passed over: the axes on both sides of it are neighbors.
 //! The normal of two parallel axes is the direction from the one to the other, and has no foot: three parallel axes have θ and no d.
 //!
 //! These are Denavit and Hartenberg's four (1955). Where an origin lies on its axis and where a frame's x points are
@@ -104,12 +105,26 @@ pub fn invariants(model: &RobotModel) -> Vec<Invariant> {
     let mut found = Vec::new();
     for id in model.joint_ids() {
         let Some(last) = line(id) else { continue };
-        let mut before = moving_joints_above(model, id).filter_map(line);
-        let (middle, first) = (before.next(), before.next());
-        let Some(middle) = middle else { continue };
-        pair(&middle, &last, &mut found);
-        if let Some(first) = first {
-            triple(&first, &middle, &last, &mut found);
+        let above: Vec<Line> = moving_joints_above(model, id).filter_map(line).collect();
+        let Some(nearest) = above.first() else {
+            continue;
+        };
+        pair(nearest, &last, &mut found);
+        let Some(at) = above.iter().position(|other| !other.slides) else {
+            continue;
+        };
+        let middle = &above[at];
+        // A slide along an axis does not change how the axes on both sides of it lie to each other.
+        if at > 0 && !last.slides {
+            pair(middle, &last, &mut found);
+        }
+        let of_slide = |slide: &Line| slide.slides && !is_parallel(middle, slide);
+        let nearest_behind = !above[..at].iter().any(of_slide) && (!last.slides || of_slide(&last));
+        let first = above[at + 1..]
+            .iter()
+            .find(|other| !other.slides || of_slide(other));
+        if let Some(first) = first.filter(|_| nearest_behind) {
+            triple(first, middle, &last, &mut found);
         }
     }
     found
@@ -190,10 +205,9 @@ fn pair(a: &Line, b: &Line, found: &mut Vec<Invariant>) {
 }
 
 fn triple(a: &Line, b: &Line, c: &Line, found: &mut Vec<Invariant>) {
-    if a.slides || b.slides || c.slides {
-        return;
-    }
-    if let (Some(to_a), Some(to_c)) = (foot(b, a), foot(b, c)) {
+    let slides = a.slides || c.slides;
+    let feet = || Some((foot(b, a)?, foot(b, c)?));
+    if let Some((to_a, to_c)) = feet().filter(|_| !slides) {
         found.push(Invariant {
             kind: InvariantKind::Offset,
             joints: [b.id; 2],
@@ -225,11 +239,17 @@ fn foot(b: &Line, other: &Line) -> Option<f64> {
     (squared.sqrt() > PARALLEL).then(|| between.cross(&other.direction).dot(&cross) / squared)
 }
 
-/// Direction of the common normal; `None` for axes on one line.
+fn is_parallel(a: &Line, b: &Line) -> bool {
+    a.direction.cross(&b.direction).norm() <= PARALLEL
+}
+
+/// Direction of the common normal; `None` for axes on one line, and for a slide along the axis.
 fn normal(b: &Line, other: &Line) -> Option<Vector3<f64>> {
-    let cross = b.direction.cross(&other.direction);
-    if cross.norm() > PARALLEL {
-        return Some(cross.normalize());
+    if !is_parallel(b, other) {
+        return Some(b.direction.cross(&other.direction).normalize());
+    }
+    if other.slides {
+        return None;
     }
     let across = across(b, other);
     (across.norm() >= ONE_LINE).then(|| across.normalize())
