@@ -32,7 +32,13 @@ const ARM: &[Joint] = &[
 const SCARA: &[Joint] = &[
     ("s1", "revolute", [0.0, 0.0, 0.3], [0, 0, 1], [-2.0, 2.0]),
     ("s2", "revolute", [0.35, 0.0, 0.05], [0, 0, 1], [-2.2, 2.2]),
-    ("s3", "prismatic", [0.3, 0.0, -0.02], [0, 0, -1], [0.0, 0.18]),
+    (
+        "s3",
+        "prismatic",
+        [0.3, 0.0, -0.02],
+        [0, 0, -1],
+        [0.0, 0.18],
+    ),
     ("s4", "revolute", [0.0, 0.0, -0.05], [0, 0, -1], [-2.9, 2.9]),
 ];
 
@@ -70,7 +76,13 @@ fn urdf(joints: &[Joint], (place, turn): (f64, f64), seed: u64) -> String {
 }
 
 /// Random postures, with the tracker and a body of four markers elsewhere in every visit, and the zero of a joint moved by some degrees.
-fn table(joints: &[Joint], truth: &RobotModel, visit: u64, rows: (usize, u64), slip: Option<(&str, f64)>) -> String {
+fn table(
+    joints: &[Joint],
+    truth: &RobotModel,
+    visit: u64,
+    rows: (usize, u64),
+    slip: Option<(&str, f64)>,
+) -> String {
     let mut setup = ChaCha8Rng::seed_from_u64(visit);
     let mut place = |range: f64| setup.random_range(-range..range);
     let tracker_from_root = Isometry3::from_parts(
@@ -81,7 +93,12 @@ fn table(joints: &[Joint], truth: &RobotModel, visit: u64, rows: (usize, u64), s
         Translation3::new(place(0.05), place(0.05), place(0.05)),
         UnitQuaternion::from_euler_angles(place(1.0), place(1.0), place(1.0)),
     );
-    let markers = [[0.0, 0.0, 0.0], [0.08, 0.0, 0.0], [0.03, 0.07, 0.0], [0.05, 0.02, 0.05]];
+    let markers = [
+        [0.0, 0.0, 0.0],
+        [0.08, 0.0, 0.0],
+        [0.03, 0.07, 0.0],
+        [0.05, 0.02, 0.05],
+    ];
     let mut rng = ChaCha8Rng::seed_from_u64(1000 * visit + rows.1);
     let unit = |kind: &str| if kind == "prismatic" { "m" } else { "rad" };
     let names = joints.iter().map(|j| format!("{}_{}", j.0, unit(j.1)));
@@ -96,7 +113,8 @@ fn table(joints: &[Joint], truth: &RobotModel, visit: u64, rows: (usize, u64), s
             _ => 0.0,
         };
         let true_q: Vec<f64> = q.iter().zip(joints).map(|(q, j)| q + moved(j)).collect();
-        let tracker_from_body = tracker_from_root * truth.root_from_link(&true_q, tip) * tip_from_body;
+        let tracker_from_body =
+            tracker_from_root * truth.root_from_link(&true_q, tip) * tip_from_body;
         let mut cells: Vec<String> = q.iter().map(|v| format!("{v:.9}")).collect();
         for p in markers {
             let noise = Vector3::from_fn(|_, _| {
@@ -140,7 +158,8 @@ outputs: {{urdf: arm.calibrated.urdf}}
         let ran = dir.calib(["run", "arm.yaml", "--out", visit]).expect(0);
         assert!(ran.stdout.contains("ACCEPTED"), "{}", ran.stdout);
         if visit == "may" {
-            dir.calib(["apply", "may", "arm.urdf", "--in-place"]).expect(0);
+            dir.calib(["apply", "may", "arm.urdf", "--in-place"])
+                .expect(0);
         }
     }
     dir.calib(["drift", "may", "june", "--json"]).json()
@@ -148,18 +167,30 @@ outputs: {{urdf: arm.calibrated.urdf}}
 
 #[test]
 fn a_slip_of_an_axis_with_parallel_or_sliding_neighbors_is_found() {
-    for (joints, seed, slipped) in [(ARM, 1, "a2"), (ARM, 2, "a3"), (ARM, 3, "a3"), (GANTRY, 4, "w1"), (GANTRY, 5, "w2")] {
+    for (joints, seed, slipped) in [
+        (ARM, 1, "a2"),
+        (ARM, 2, "a3"),
+        (ARM, 3, "a3"),
+        (GANTRY, 4, "w1"),
+        (GANTRY, 5, "w2"),
+    ] {
         let found = drift(joints, seed, Some((slipped, 0.2)));
         assert_eq!(found["changed"], true, "{slipped} {seed}: {found:#}");
         let numbers = found["numbers"].as_array().expect("a list");
-        let significant: Vec<&Value> = numbers.iter().filter(|n| n["significant"] == true).collect();
+        let significant: Vec<&Value> = numbers
+            .iter()
+            .filter(|n| n["significant"] == true)
+            .collect();
         assert_eq!(significant.len(), 1, "{slipped} {seed}: {significant:#?}");
         let zero = significant[0];
         assert_eq!(zero["name"], format!("zero.{slipped}"), "{seed}");
         let of = |key: &str| zero[key].as_f64().expect("a number");
         let off = of("change").abs() - 0.2_f64.to_radians();
         assert!(off.abs() < 4.0 * of("sigma"), "{slipped} {seed}: {zero}");
-        assert!(of("sigma") < 0.05_f64.to_radians(), "{slipped} {seed}: {zero}");
+        assert!(
+            of("sigma") < 0.05_f64.to_radians(),
+            "{slipped} {seed}: {zero}"
+        );
     }
     // How far a SCARA's axes are from each other depends on the height, which nobody knows: that something changed is known, not which number.
     for seed in [6, 7] {
@@ -173,11 +204,22 @@ fn a_slip_of_an_axis_with_parallel_or_sliding_neighbors_is_found() {
 
 #[test]
 fn a_month_without_a_slip_is_no_change() {
-    for (joints, seed) in [(ARM, 11), (ARM, 12), (SCARA, 13), (SCARA, 14), (SCARA, 15), (GANTRY, 16)] {
+    for (joints, seed) in [
+        (ARM, 11),
+        (ARM, 12),
+        (SCARA, 13),
+        (SCARA, 14),
+        (SCARA, 15),
+        (GANTRY, 16),
+    ] {
         let found = drift(joints, seed, None);
         assert_eq!(found["changed"], false, "{seed}: {found:#}");
         let numbers = found["numbers"].as_array().expect("a list");
         // Zeros that have neighbors on both sides are compared.
-        assert!(numbers.iter().any(|n| n["name"].as_str().is_some_and(|n| n.starts_with("zero."))));
+        assert!(
+            numbers
+                .iter()
+                .any(|n| n["name"].as_str().is_some_and(|n| n.starts_with("zero.")))
+        );
     }
 }

@@ -6,6 +6,8 @@
 //!
 //! g is 0 but for the parameters on their bounds: (1) is one Newton step of the unconstrained fit, exact where the model
 //! is linear.
+//!
+//! Tests of what the model lacks hold them there ([`Solution::held`]): a gradient that is not 0 would be read as that of whatever looks like them.
 
 use nalgebra::DVector;
 
@@ -28,6 +30,30 @@ pub struct Unbounded {
 }
 
 impl Solution {
+    /// H of the fit, for tests that start from its minimum.
+    pub(crate) fn held_curvature(&self) -> NormalEquations {
+        self.held(self.information.curvature(&self.model))
+    }
+
+    /// Normal equations whose steps leave the parameters on their bounds there.
+    pub(crate) fn held(&self, mut system: NormalEquations) -> NormalEquations {
+        /// Times its own curvature: a step of nothing.
+        const FIXED: f64 = 1e12;
+        let n = system.n;
+        for (column, p) in self.model.columns.iter().enumerate() {
+            if !self.parameters[*p].at_bound {
+                continue;
+            }
+            for other in (0..n).filter(|other| *other != column) {
+                system.h[column * n + other] = 0.0;
+                system.h[other * n + column] = 0.0;
+            }
+            system.h[column * n + column] *= FIXED;
+            system.g[column] = 0.0;
+        }
+        system
+    }
+
     /// Equation (1) for every parameter on one of its bounds; `None` when the model cannot be evaluated.
     #[must_use]
     pub fn without_bounds(&self) -> Option<Vec<Unbounded>> {

@@ -113,7 +113,7 @@ impl Solution {
         let moved =
             |joint: &EdgeId| Candidate::of_joint(*joint, EffectKind::ZeroOffset, vec![1.0; count]);
         let candidates: Vec<Candidate> = joints.iter().map(moved).collect();
-        let c = covariance_of(&self.information.curvature(&self.model))?;
+        let c = covariance_of(&self.held_curvature())?;
         let half = c.cholesky()?.l();
         let excess = (self.chi2 / self.degrees_of_freedom.max(1.0)).max(1.0);
         let mut scans: Vec<Scan> = joints

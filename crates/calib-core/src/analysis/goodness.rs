@@ -264,7 +264,7 @@ impl Solution {
         }
         // From the minimum of all samples to that of those looked at, U ← U + bᵀδ.
         let (c, step) = if looked_at.all {
-            (covariance_of(&self.information.curvature(model))?, None)
+            (covariance_of(&self.held_curvature())?, None)
         } else {
             let (c, step) = self.to_own_minimum(&h, &g)?;
             u.gemv_tr(1.0, &b, &step, 1.0);
@@ -338,6 +338,7 @@ impl Solution {
     ) -> Option<(DMatrix<f64>, DVector<f64>)> {
         let mut system = NormalEquations::of(h, g);
         add_prior(&self.model, &self.values, &mut system);
+        let system = self.held(system);
         let c = covariance_of(&system)?;
         let step = -(&c * DVector::from_row_slice(&system.g));
         Some((c, step))

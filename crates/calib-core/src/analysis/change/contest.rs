@@ -238,6 +238,7 @@ impl Solution {
         add_prior(model, &self.values, &mut system);
         let parameters = model.columns.iter().map(|p| &model.problem.parameters[*p]);
         let priors = parameters.filter(|p| p.prior_sigma.is_some()).count();
+        let system = self.held(system);
         let c = covariance_of(&system)?;
         let gradient = DVector::from_column_slice(&system.g);
         let step = -(&c * &gradient);

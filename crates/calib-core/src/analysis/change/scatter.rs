@@ -346,6 +346,7 @@ impl Level {
         }
         let mut system = NormalEquations::of(&h, &g);
         add_prior(model, &solution.values, &mut system);
+        let system = solution.held(system);
         let root = root_of(&system)?;
         // ln|H| = −ln|C|
         out.log_det -= root.diagonal().iter().map(|x| 2.0 * x.ln()).sum::<f64>();

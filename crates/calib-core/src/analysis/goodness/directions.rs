@@ -164,7 +164,7 @@ impl Solution {
             }
         });
         let c = if looked_at.all {
-            covariance_of(&self.information.curvature(model))?
+            covariance_of(&self.held_curvature())?
         } else {
             let (c, step) = self.to_own_minimum(&h, &g)?;
             u.gemv_tr(1.0, &b, &step, 1.0);

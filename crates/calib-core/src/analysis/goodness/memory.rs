@@ -46,7 +46,7 @@ impl Solution {
         if effects.is_empty() {
             return None;
         }
-        let c = covariance_of(&self.information.curvature(&self.model))?;
+        let c = covariance_of(&self.held_curvature())?;
         let k = effects.len();
         let mut b = DMatrix::zeros(self.model.free(), k);
         let (mut own, mut u) = (DMatrix::zeros(k, k), DVector::zeros(k));

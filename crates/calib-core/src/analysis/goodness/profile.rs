@@ -88,6 +88,7 @@ impl Solution {
         });
         let mut system = NormalEquations::of(&h, &g);
         add_prior(model, &self.values, &mut system);
+        let system = self.held(system);
         let covariance = covariance_of(&system)?;
         let gradient = DVector::from_row_slice(&system.g);
         let step = -(&covariance * &gradient);

@@ -187,6 +187,7 @@ impl Design {
         let model = &solution.model;
         let mut system = NormalEquations::of(h, g);
         add_prior(model, &solution.values, &mut system);
+        let system = solution.held(system);
         self.root = root_of(&system)?.transpose();
         // δ = −R a,   a = Rᵀ g,   U ← U + Eᵀ δ,   F ← F − gᵀ C g
         let root = &self.root;
