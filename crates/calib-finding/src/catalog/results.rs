@@ -116,7 +116,7 @@ super::topic! {
     GEAR_RATIO_FOUND = "gear-ratio-found" {
         "": Info,
             "Joint `{joint}` errs by {amplitude}, {ratio} ± {sigma} times per turn, as a gear train out of center does once per turn of its motor (probability of chance over all joints and ratios: {chance}).",
-            "Compare the ratio with the gear's data sheet, then state it, `robot: {gear_ratio: {{joint}: {whole}}}`, and add `motor_eccentricity` to the list `solve: free`.";
+            "Compare the ratio with the gear's data sheet, then state it, `robot: {gear_ratio: {{joint}: {stated}}}`, and add `motor_eccentricity` to the list `solve: free`.";
     }
     /// A marker scatters unlike the others of its body.
     MARKER_NOISE = "marker-noise" {

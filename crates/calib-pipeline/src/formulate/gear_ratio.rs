@@ -18,12 +18,22 @@ pub(crate) fn searched(fit: &MlFit) -> Vec<Finding> {
     clear.map(|gear| finding(&gear)).collect()
 }
 
+/// The ratio to state: the whole number that agrees with what was found, else what was found, to a fifth of its σ.
+fn stated(gear: &GearRatio) -> String {
+    let whole = gear.ratio.round();
+    if (gear.ratio - whole).abs() <= 2.0 * gear.sigma {
+        return format!("{whole}");
+    }
+    let digits = (-(gear.sigma / 2.0).log10()).ceil().clamp(1.0, 6.0);
+    format!("{:.*}", digits as usize, gear.ratio)
+}
+
 fn finding(gear: &GearRatio) -> Finding {
     Finding::new(catalog::GEAR_RATIO_FOUND, About::Fit)
         .with("joint", Fact::name(gear.name.clone()))
         .with("ratio", Fact::ratio(gear.ratio))
         .with("sigma", Fact::ratio(gear.sigma))
-        .with("whole", Fact::count(gear.ratio.round() as usize))
+        .with("stated", Fact::name(stated(gear)))
         .with("amplitude", Fact::radians(gear.amplitude))
         .with("chance", Fact::ratio(gear.p_corrected))
 }

@@ -187,8 +187,10 @@ fn goodness(e: &Evidence<'_>, fit: &MlFit) -> Goodness {
     let s = &fit.solution;
     /// Levels from fewer samples say little.
     const ENOUGH: usize = 20;
-    /// Standard errors of ln σ: by chance one level of 30 000 is as far above.
-    const CERTAIN: f64 = 4.0;
+    /// Standard errors of ln σ: by chance one level of 30 000 is as far above, of a level from few samples; else one of 700.
+    const CERTAIN: [f64; 2] = [4.0, 3.0];
+    /// Standard errors of σ²: 99 % on one side.
+    const CERTAIN_SQUARE: f64 = 2.33;
     let of_markers = e.tracks.values().filter_map(|track| track.marker_sigma);
     let rigid = median(of_markers.collect());
     // Means of holds have less noise than the rows that a profile states it of: those are no less certain than stated for it.
@@ -203,15 +205,24 @@ fn goodness(e: &Evidence<'_>, fit: &MlFit) -> Goodness {
     };
     let beside = s.noise.iter().filter_map(|n| {
         let stated = stated_sigma(&e.inputs.robot.profile, &n.name).filter(|s| *s > 0.0)?;
-        // Of few samples, what is beyond doubt above what is stated.
-        let certain = |relative: f64| n.sigma * (-CERTAIN * relative).exp() > stated;
         let few = (n.samples < ENOUGH).then_some(n.samples);
-        let told = few.is_none() || n.relative_error.is_some_and(certain);
-        let known = n.estimated && told && n.kind != NoiseKind::Scale;
-        known.then(|| FoundNoise {
+        let known = n.estimated && n.kind != NoiseKind::Scale;
+        let relative = n.relative_error.filter(|_| known)?;
+        let factor = n.sigma / stated;
+        let of_rows = n.sigma.max(within.of_kind(n.kind).sqrt()) / stated;
+        // What is beyond doubt above or below what is stated. Joints' noise hides behind that of markers: its square, not its logarithm, is found with
+        // an error that does not depend on it.
+        let certain = CERTAIN[usize::from(few.is_none())];
+        let of_square =
+            |ratio: f64| n.kind != NoiseKind::Joint || ratio > CERTAIN_SQUARE * 2.0 * relative;
+        let above = factor * (-certain * relative).exp() > 1.0 && of_square(1.0 - factor.powi(-2));
+        let below = few.is_none()
+            && of_rows * (certain * relative).exp() < 1.0
+            && of_square(of_rows.powi(-2) - 1.0);
+        (above || below).then(|| FoundNoise {
             group: n.name.clone(),
-            factor: n.sigma / stated,
-            of_rows: n.sigma.max(within.of_kind(n.kind).sqrt()) / stated,
+            factor,
+            of_rows,
             rigid: rigid_of(&n.name)
                 .filter(|_| n.kind == NoiseKind::Position)
                 .map(|sigma| sigma / stated),

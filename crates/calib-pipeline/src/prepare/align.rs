@@ -114,7 +114,7 @@ fn aligned(
         .into_iter()
         .filter(|f| f.severity != Severity::Error)
         .map(|f| f.in_recording(name))
-        .chain(blanks::of_streams(name, &streams.joints))
+        .chain(blanks::of_streams(name, &streams.joints, streams.line))
         .chain(repeated)
         .collect();
     let clocks = match streams.stated_clocks(timing) {

@@ -67,12 +67,17 @@ pub(super) fn of_table(recording: &str, poses: &Poses, aligned: bool) -> Vec<Fin
     joints.into_iter().map(finding).collect()
 }
 
-/// Gaps between the readings of streams, a finding for all joints that have the same.
-pub(super) fn of_streams(recording: &str, joints: &BTreeMap<String, Scalars>) -> Vec<Finding> {
+/// Gaps between the readings of streams, a finding for all joints that have the same. `tracker` is the time line of the tracker's rows: where
+/// the joints are on it, a time without rows is one in which the tracker saw nothing either, as between the holds of `calib record`.
+pub(super) fn of_streams(
+    recording: &str,
+    joints: &BTreeMap<String, Scalars>,
+    tracker: usize,
+) -> Vec<Finding> {
     // Nanoseconds: what is equal is told once.
     let mut found: BTreeMap<(i64, i64), Vec<&String>> = BTreeMap::new();
     for (joint, stream) in joints {
-        let (all, longest) = gaps(stream);
+        let (all, longest) = gaps(stream, stream.timeline == tracker);
         if longest > 0.0 {
             let key = |seconds: f64| (seconds * 1e9).round() as i64;
             found
@@ -91,19 +96,27 @@ pub(super) fn of_streams(recording: &str, joints: &BTreeMap<String, Scalars>) ->
     found.into_iter().map(finding).collect()
 }
 
-/// Time in gaps between the first and the last reading, and in the longest of them, s.
-fn gaps(stream: &Scalars) -> (f64, f64) {
-    let values = stream.values.iter().zip(&stream.t);
-    let times: Vec<f64> = values
-        .filter(|(value, _)| value.is_some())
-        .map(|(_, t)| *t)
+/// Time in gaps between the first and the last reading, and in the longest of them, s; only of those with rows in them where the tracker
+/// shares the rows.
+fn gaps(stream: &Scalars, shared: bool) -> (f64, f64) {
+    let values = stream.values.iter().zip(&stream.t).enumerate();
+    let times: Vec<(usize, f64)> = values
+        .filter(|(_, (value, _))| value.is_some())
+        .map(|(row, (_, t))| (row, *t))
         .collect();
-    let steps: Vec<f64> = times.windows(2).map(|w| w[1] - w[0]).collect();
-    let mut sorted = steps.clone();
+    let step = |w: &[(usize, f64)]| w[1].1 - w[0].1;
+    let mut sorted: Vec<f64> = times.windows(2).map(step).collect();
     sorted.sort_by(f64::total_cmp);
     let usual = sorted.get(sorted.len() / 2).copied().unwrap_or(0.0);
     let limit = LEAST_GAP.max(GAP * usual);
-    let long = || steps.iter().copied().filter(|step| *step > limit);
+    let lacks = |w: &&[(usize, f64)]| !shared || w[1].0 > w[0].0 + 1;
+    let long = || {
+        times
+            .windows(2)
+            .filter(lacks)
+            .map(step)
+            .filter(|step| *step > limit)
+    };
     (long().sum(), long().fold(0.0, f64::max))
 }
 
@@ -124,14 +137,25 @@ mod tests {
         };
         // Every reading, and one in 60: the readings are 0.6 s apart, as usual.
         for n in [1, 60] {
-            assert!(of_streams("r", &stream(times.clone(), every(n))).is_empty());
+            assert!(of_streams("r", &stream(times.clone(), every(n)), 0).is_empty());
         }
         let mut values = every(1);
         values[200..350].fill(None);
         values[700..760].fill(None);
-        let found = of_streams("r", &stream(times, values));
+        let found = of_streams("r", &stream(times, values), 0);
         assert_eq!(found.len(), 1);
         assert!(found[0].text().contains("2120 ms"), "{}", found[0].text());
         assert!(found[0].text().contains("1510 ms"), "{}", found[0].text());
+    }
+
+    #[test]
+    fn between_holds_nothing_is_lost() {
+        let times: Vec<f64> = (0..300)
+            .map(|i| 0.01 * f64::from(i) + 5.0 * f64::from(i / 100))
+            .collect();
+        let held = stream(times, vec![Some(0.1); 300]);
+        assert!(of_streams("r", &held, 0).is_empty());
+        // A log of the robot's own has lost readings.
+        assert_eq!(of_streams("r", &held, 1).len(), 1);
     }
 }
