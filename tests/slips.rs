@@ -129,8 +129,8 @@ fn table(
     text
 }
 
-/// What `calib drift` says of a month with this slip.
-fn drift(joints: &[Joint], seed: u64, slip: Option<(&str, f64)>) -> Value {
+/// A month with this slip: the results `may` and `june`.
+fn months(joints: &[Joint], seed: u64, slip: Option<(&str, f64)>) -> Scratch {
     let profile = format!(
         "calib: 1
 robot: {{name: arm, urdf: arm.urdf}}
@@ -162,7 +162,38 @@ outputs: {{urdf: arm.calibrated.urdf}}
                 .expect(0);
         }
     }
+    dir
+}
+
+/// What `calib drift` says of it.
+fn drift(joints: &[Joint], seed: u64, slip: Option<(&str, f64)>) -> Value {
+    let dir = months(joints, seed, slip);
     dir.calib(["drift", "may", "june", "--json"]).json()
+}
+
+#[test]
+fn what_is_no_evidence_of_the_robot_is_said() {
+    let dir = months(SCARA, 21, None);
+    let same = dir.calib(["drift", "may", "may"]).expect(0);
+    assert!(
+        same.stdout.contains("the same recordings"),
+        "{}",
+        same.stdout
+    );
+    let other = dir.calib(["drift", "may", "june"]).expect(0);
+    assert!(!other.stdout.contains("warning"), "{}", other.stdout);
+    let report = dir.read("june/report.json");
+    let rejected = report.replace("\"verdict\": \"accepted\"", "\"verdict\": \"rejected\"");
+    assert_ne!(rejected, report);
+    let dir = dir.file("june/report.json", rejected);
+    let said = dir.calib(["drift", "may", "june"]).expect(0);
+    assert!(
+        said.stdout.contains("june/report.json is of a rejected"),
+        "{}",
+        said.stdout
+    );
+    let history = dir.calib(["history", "may", "june"]).expect(0);
+    assert!(history.stdout.contains("REJECTED"), "{}", history.stdout);
 }
 
 #[test]

@@ -412,6 +412,50 @@ fn exchanged_columns_in_one_joint_sweeps() {
     }
 }
 
+/// The values of the joints in another order than the names of the columns.
+#[test]
+fn columns_in_another_order_are_named_with_the_map_that_mends_them() {
+    let joints: Vec<&str> = JOINTS.iter().map(|j| j.0).collect();
+    let last = joints.len() - 1;
+    // Which joint's values each column holds.
+    let orders: [fn(usize, usize) -> usize; 3] = [
+        |k, last| last - k,
+        |k, last| (k + 1) % (last + 1),
+        |k, last| (k + last) % (last + 1),
+    ];
+    for (design, markers, seed) in [(Design::Random(40), FOUR, 31), (Design::Sweeps, ONE, 32)] {
+        let setting = Setting::new(design, markers, seed);
+        for order in orders {
+            let mut dir = setting.folder();
+            for table in setting.tables() {
+                dir = rows(dir, &table, |_, header, cells| {
+                    let column = |joint: &str| {
+                        let name = format!("{joint}_deg");
+                        header.iter().position(|h| *h == name).expect("a column")
+                    };
+                    let right = cells.clone();
+                    for (k, joint) in joints.iter().enumerate() {
+                        cells[column(joint)] = right[column(joints[order(k, last)])].clone();
+                    }
+                });
+            }
+            let found = findings(&dir);
+            let wrong = errors(&found);
+            assert_eq!(wrong.len(), 1, "{found:#?}");
+            assert_eq!(wrong[0]["id"], "joint-order", "{found:#?}");
+            let entries = wrong[0]["facts"]["entries"].as_str().expect("entries");
+            let said: Vec<&str> = entries.split(", ").collect();
+            let meant = (0..=last).filter(|k| order(*k, last) != *k).map(|k| {
+                let (column, joint) = (joints[k], joints[order(k, last)]);
+                format!("{joint}: <column of {column}>")
+            });
+            let mut meant: Vec<String> = meant.collect();
+            meant.sort_by_key(|entry| said.iter().position(|s| s == entry));
+            assert_eq!(said, meant);
+        }
+    }
+}
+
 #[test]
 fn a_joint_that_moves_with_another_one() {
     for (factor, seed) in [(1.0, 8), (-1.0, 9)] {

@@ -103,6 +103,10 @@ pub struct Drift {
     /// Both start from the same nominal URDF. Otherwise parameters are displacements from different places, and only what no choice of
     /// frames changes, and effects of joints, are compared.
     pub same_nominal: bool,
+    /// Which of both were rejected: what their models do not explain may look like a change.
+    pub rejected: Vec<String>,
+    /// Both were made from the same recordings.
+    pub same_recordings: bool,
     /// Parameters that only the old calibration had.
     pub only_old: Vec<String>,
     /// Parameters that only the new one has.
@@ -176,6 +180,12 @@ pub fn compare(old: &Evidence, new: &Evidence) -> Result<Drift, DriftError> {
         not_credible,
         directions_not_credible: old.not_credible().max(new.not_credible()),
         same_nominal,
+        rejected: [old, new]
+            .iter()
+            .filter(|e| e.rejected)
+            .map(|e| e.file.clone())
+            .collect(),
+        same_recordings: !new.recordings.is_empty() && old.recordings == new.recordings,
         only_old,
         only_new,
     })

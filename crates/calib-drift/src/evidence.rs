@@ -1,9 +1,9 @@
 //! One calibration's side of the comparison: U, x̃, and the numbers to be compared.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_geometry::decompose;
-use calib_report::{DataInformation, NoiseKind, Parameter, Report, Unit};
+use calib_report::{DataInformation, NoiseKind, Parameter, Report, Unit, Verdict};
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::DriftError;
@@ -36,6 +36,10 @@ pub struct Evidence {
     pub robot: String,
     /// SHA-256 of the nominal URDF that it started from.
     pub description: String,
+    /// Whether it was rejected.
+    pub rejected: bool,
+    /// SHA-256 of the recordings.
+    pub recordings: BTreeSet<String>,
     /// Parameters, by column.
     pub parameters: Vec<String>,
     /// Whether a parameter belongs to the robot and not to where tracker and bodies stood.
@@ -128,6 +132,18 @@ fn description(report: &Report) -> String {
         .and_then(|path| report.inputs.iter().find(|i| i.path == path))
         .map(|i| i.sha256.clone())
         .unwrap_or_default()
+}
+
+/// SHA-256 of the files that were recorded: not those of profile, URDF and meshes.
+fn recordings(report: &Report) -> BTreeSet<String> {
+    let written = ["yaml", "yml", "urdf", "xacro", "stl", "dae", "obj"];
+    let inputs = report.inputs.iter();
+    let recorded = inputs.filter(|i| {
+        !written
+            .iter()
+            .any(|ext| i.path.ends_with(&format!(".{ext}")))
+    });
+    recorded.map(|i| i.sha256.clone()).collect()
 }
 
 /// Degrees of freedom of the noise: with levels of their own, the level that is known worst decides how heavy the tails are.
@@ -251,6 +267,8 @@ impl Evidence {
             file: file.to_owned(),
             robot: report.robot.clone(),
             description: description(report),
+            rejected: report.verdict == Verdict::Rejected,
+            recordings: recordings(report),
             of_robot: parameters.iter().map(|p| p.joint.is_some()).collect(),
             parameters: info.parameters.clone(),
             root,

@@ -19,6 +19,8 @@ pub struct Calibration {
     pub report: String,
     /// When it was measured, as its profile states it.
     pub date: Option<String>,
+    /// Whether it was rejected: what its model does not explain may look like a change.
+    pub rejected: bool,
     /// Whether the robot changed since the calibration before, at a false-alarm rate of 1 %; null for the first, and where that is not
     /// decided or the two have nothing in common.
     pub changed: Option<bool>,
@@ -105,6 +107,7 @@ pub fn history(reports: &[impl AsRef<Path>]) -> Result<History, DriftError> {
         calibrations.push(Calibration {
             report: evidence.file.clone(),
             date: date.clone(),
+            rejected: evidence.rejected,
             changed: drift.as_ref().map(|d| d.changed),
             changed_since_first: since_first.map(|d| d.changed),
             what: significant

@@ -16,6 +16,14 @@ fn named(i: usize, of: &Calibration) -> String {
 
 /// Since the calibration before the one at place `i`, and since the first.
 fn since((i, of): (usize, &Calibration)) -> String {
+    let changes = changes((i, of));
+    match of.rejected {
+        true => format!("REJECTED  {changes}"),
+        false => changes,
+    }
+}
+
+fn changes((i, of): (usize, &Calibration)) -> String {
     let step = match of.changed {
         None if i == 0 => String::new(),
         None => "not decided: see calib drift".to_owned(),

@@ -180,3 +180,54 @@ fn limbs(chain: &Chain) -> Vec<ColumnOrder> {
     }
     pairs
 }
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::{Isometry3, Vector3};
+
+    use super::super::chain::ChainJoint;
+    use super::*;
+
+    /// A turning trunk with two arms of three joints, the last of one of them sliding or not.
+    fn robot(slides: bool) -> Chain {
+        let parents = [0, 1, 2, 3, 1, 5, 6];
+        let joint = |(j, parent): (usize, usize)| ChainJoint {
+            parent: LinkIndex(parent),
+            child: LinkIndex(j + 1),
+            parent_from_joint: Isometry3::identity(),
+            motion: match slides && j == 6 {
+                true => Motion::Prismatic(Vector3::z_axis()),
+                false => Motion::Revolute(Vector3::z_axis()),
+            },
+            law: vec![(JointIndex(j), 1.0)],
+            offset: 0.0,
+        };
+        let joints = parents.into_iter().enumerate().map(joint).collect();
+        Chain::new(8, joints).expect("a tree")
+    }
+
+    #[test]
+    fn limbs_of_the_same_build_are_exchanged_joint_by_joint() {
+        let alike = limbs(&robot(false));
+        let (first, second) = (JointIndex(1), JointIndex(4));
+        assert_eq!(alike, [ColumnOrder::Limbs { first, second }]);
+        let columns: Vec<usize> = alike[0]
+            .columns(&robot(false))
+            .iter()
+            .map(|c| c.0)
+            .collect();
+        assert_eq!(columns, [0, 4, 5, 6, 1, 2, 3]);
+        assert!(limbs(&robot(true)).is_empty());
+    }
+
+    #[test]
+    fn orders_by_name_undo_each_other() {
+        let mut chain = robot(false);
+        chain.alphabet = vec![3, 0, 6, 1, 5, 2, 4];
+        let there = ColumnOrder::Alphabetical(Columns::All).columns(&chain);
+        let back = ColumnOrder::Robots(Columns::All).columns(&chain);
+        assert!((0..7).all(|j| back[there[j].0] == JointIndex(j)));
+        // The column with the k-th name holds the values of the k-th joint of the alphabet.
+        assert_eq!(there[1], JointIndex(0));
+    }
+}

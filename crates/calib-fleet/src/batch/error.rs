@@ -29,6 +29,11 @@ pub enum FleetFault {
     /// No robots.
     #[error("names no robot\n  help: correct the pattern, or add robots to the list")]
     Empty,
+    /// Where an earlier batch should be.
+    #[error(
+        "is no folder of an earlier batch: it has no folder `robots`\n  help: name the folder that `calib batch --out` wrote"
+    )]
+    NoBatch,
     /// A name that no folder can have.
     #[error("no folder can be called {0:?}\n  help: give that robot another `name`")]
     Name(String),

@@ -63,6 +63,10 @@ pub fn members(fleet: &str, earlier: Option<&Path>) -> Result<Vec<Member>, Batch
     if members.is_empty() {
         return Err(failed(FleetFault::Empty));
     }
+    if let Some(folder) = earlier.filter(|folder| !folder.join(super::ROBOTS).is_dir()) {
+        let folder = folder.display().to_string();
+        return Err(BatchError::fleet(&folder, FleetFault::NoBatch));
+    }
     for member in &mut members {
         let last = earlier.map(|folder| folder.join(super::ROBOTS).join(&*member.name));
         let there = |folder: &PathBuf| folder.join(calib_report::REPORT).is_file();

@@ -4,7 +4,7 @@ use calib_capture::{
     Guide, JointColumn, JointSource, Plan, Screen, Survey, Unit, Watched, grid, parse_joints,
 };
 use calib_pipeline::prepare::load::RobotProfile;
-use calib_profile::RecordingSpec;
+use calib_profile::{RecordingSpec, TimedPoses};
 use calib_urdf::JointId;
 
 use super::bodies::{joints_of, moved, watched};
@@ -77,6 +77,7 @@ pub(super) fn plan(
             "{poses}. Keys, each with Enter: none = the robot is at the pose; r = record the last pose again; s = skip the pose; k = count the pose though a body is hidden; q = stop."
         ));
     }
+    say_short(spec, options.hold, screen);
     Ok(Plan {
         columns,
         joints,
@@ -109,6 +110,23 @@ pub(super) fn assumed_zero(
     names
         .filter(|name| !columns.iter().any(|c| c.name == *name))
         .collect()
+}
+
+/// What is recorded must count as a hold afterwards.
+fn say_short(spec: &RecordingSpec, hold: f64, screen: &mut dyn Screen) {
+    let settles = spec
+        .timing
+        .as_ref()
+        .filter(|t| t.poses == TimedPoses::Settle);
+    if let Some(needed) = settles
+        .map(|timing| timing.hold)
+        .filter(|needed| hold < *needed)
+    {
+        screen.line(&format!(
+            "warning: {hold} s of each pose are recorded, and the profile takes {needed} s for a hold: unless the tracker's clock runs faster, nothing of the file can be used. Record longer (--hold {}), or state a shorter `timing: {{hold_s: …}}`.",
+            2.0 * needed
+        ));
+    }
 }
 
 fn say_zero(joints: &[String], screen: &mut dyn Screen) {
