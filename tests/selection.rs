@@ -139,7 +139,7 @@ fn a_gear_ratio_that_nobody_stated_is_found_and_its_remedy_works() {
     assert!(chosen.code < 2, "{}", chosen.stderr);
     let facts = found(&dir.json("chosen/report.json")).expect("a gear ratio");
     assert_eq!(facts["joint"], "elbow");
-    assert_eq!(facts["whole"], 121);
+    assert_eq!(facts["stated"], "121");
     // The remedy, as it is said.
     let dir = dir
         .edit(

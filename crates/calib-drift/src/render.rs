@@ -18,19 +18,7 @@ pub fn text(drift: &Drift) -> String {
     let (free, entangled): (Vec<&Changed>, Vec<&Changed>) =
         significant.iter().partition(|n| n.gauge_free);
     out += &headline(drift, &significant);
-    if drift.same_recordings {
-        out += &terminal::wrapped(
-            "Both were made from the same recordings, byte for byte: this compares profiles, not the robot at two times.",
-            "warning: ",
-            "  ",
-        );
-    }
-    for file in &drift.rejected {
-        let text = format!(
-            "{file} is of a rejected calibration: what its model does not explain, as a tracker that moved or an effect, looks like a change of the robot. Read its report first."
-        );
-        out += &terminal::wrapped(&text, "warning: ", "  ");
-    }
+    out += &warnings(drift);
     out += &terminal::wrapped(
         &format!(
             "all at once: squared distance {:.1}, p {} ({} directions that both recordings see)",
@@ -118,6 +106,25 @@ pub fn text(drift: &Drift) -> String {
             "",
             "  ",
         );
+    }
+    out
+}
+
+/// What makes the answer another one than that about the robot.
+fn warnings(drift: &Drift) -> String {
+    let mut out = String::new();
+    if drift.same_recordings {
+        out += &terminal::wrapped(
+            "Both were made from the same recordings, byte for byte: this compares profiles, not the robot at two times.",
+            "warning: ",
+            "  ",
+        );
+    }
+    for file in &drift.rejected {
+        let text = format!(
+            "{file} is of a rejected calibration: what its model does not explain, as a tracker that moved or an effect, looks like a change of the robot. Read its report first."
+        );
+        out += &terminal::wrapped(&text, "warning: ", "  ");
     }
     out
 }

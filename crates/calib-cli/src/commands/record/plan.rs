@@ -123,7 +123,7 @@ fn say_short(spec: &RecordingSpec, hold: f64, screen: &mut dyn Screen) {
         .filter(|needed| hold < *needed)
     {
         screen.line(&format!(
-            "warning: {hold} s of each pose are recorded, and the profile takes {needed} s for a hold: unless the tracker's clock runs faster, nothing of the file can be used. Record longer (--hold {}), or state a shorter `timing: {{hold_s: …}}`.",
+            "warning: --hold {hold} s is shorter than the hold of {needed} s that the profile asks for: unless the tracker's clock runs faster, nothing of the file can be used. Record longer (--hold {}), or state a shorter `timing: {{hold_s: …}}`.",
             2.0 * needed
         ));
     }

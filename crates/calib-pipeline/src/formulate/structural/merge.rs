@@ -43,7 +43,10 @@ fn explains(named: &Finding, finding: &Finding, fitted: &[&String]) -> bool {
                 let joint = named.facts.get(key).and_then(Fact::word);
                 matches!(&finding.subject.about, About::Joint(name) if Some(name.as_str()) == joint)
             };
-            inside && of_readings && (about("joint") || about("other"))
+            // Several columns in another order: any of them.
+            let several = named.facts.get("entries").is_some();
+            let any = several && matches!(finding.subject.about, About::Joint(_));
+            inside && of_readings && (any || about("joint") || about("other"))
         }
         _ => false,
     }
