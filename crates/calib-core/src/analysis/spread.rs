@@ -18,6 +18,7 @@ use calib_geometry::so3;
 
 use crate::analysis::solution::Solution;
 use crate::graph::ids::ParameterId;
+use crate::solve::whitened::covariance_of;
 
 /// A point at one posture, and how it follows the free parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,6 +89,9 @@ const NOTHING: f64 = 1e-8;
 /// vectors are accurate to about 1e-9.
 const OPEN: f64 = 1e-6;
 
+/// A variance above this many times that of the noise alone was widened.
+const WIDENED: f64 = 1.5;
+
 /// Parameters named per direction.
 const TERMS: usize = 6;
 
@@ -134,7 +138,7 @@ impl Solution {
             } else {
                 0.0
             },
-            size: size(points, &g, &half, &prior),
+            size: self.size(points, &g, &half, &prior),
             directions,
             unbounded: self.is_unbounded(&g, root),
         })
@@ -187,6 +191,48 @@ impl Solution {
         DVector::from_iterator(free.len(), free.iter().map(of))
     }
 
+    /// Equation (5) and the share of (4).
+    fn size(
+        &self,
+        points: &[LinearPoint],
+        g: &DMatrix<f64>,
+        half: &DMatrix<f64>,
+        prior: &DVector<f64>,
+    ) -> Option<SizeSpread> {
+        let center = centroid(points);
+        let d: Vec<f64> = points
+            .iter()
+            .flat_map(|p| {
+                (p.position.coords - center)
+                    .iter()
+                    .copied()
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        let d = DVector::from_vec(d);
+        let reach = d.norm_squared();
+        if reach.sqrt() < NOTHING {
+            return None;
+        }
+        // a = Gᵀ d / |d|²,   Ca = H (Hᵀ a)
+        let a = g.transpose() * &d / reach;
+        let ha = half.transpose() * &a;
+        let variance = ha.norm_squared();
+        let ca = half * ha;
+        let share = |ca: &DVector<f64>| match a.dot(ca) {
+            variance if variance > 0.0 => weighted(prior, ca) / variance,
+            _ => 0.0,
+        };
+        // Residuals that are no noise make σ larger than the data's, and priors no better known.
+        let by_noise = covariance_of(&self.information.curvature(&self.model)).map(|c| c * &a);
+        let widened = by_noise.filter(|own| variance > WIDENED * a.dot(own));
+        let share = share(widened.as_ref().unwrap_or(&ca));
+        Some(SizeSpread {
+            sigma: variance.sqrt(),
+            prior_share: share.clamp(0.0, 1.0),
+        })
+    }
+
     fn is_unbounded(&self, g: &DMatrix<f64>, root: f64) -> bool {
         let mut open = self.information.indeterminate.clone();
         for (i, s) in self.information.scale.iter().enumerate() {
@@ -233,44 +279,6 @@ fn rigid_motions(points: &[LinearPoint]) -> DMatrix<f64> {
 fn centroid(points: &[LinearPoint]) -> Vector3<f64> {
     let sum: Vector3<f64> = points.iter().map(|p| p.position.coords).sum();
     sum / points.len() as f64
-}
-
-/// Equation (5) and the share of (4).
-fn size(
-    points: &[LinearPoint],
-    g: &DMatrix<f64>,
-    half: &DMatrix<f64>,
-    prior: &DVector<f64>,
-) -> Option<SizeSpread> {
-    let center = centroid(points);
-    let d: Vec<f64> = points
-        .iter()
-        .flat_map(|p| {
-            (p.position.coords - center)
-                .iter()
-                .copied()
-                .collect::<Vec<_>>()
-        })
-        .collect();
-    let d = DVector::from_vec(d);
-    let reach = d.norm_squared();
-    if reach.sqrt() < NOTHING {
-        return None;
-    }
-    // a = Gᵀ d / |d|²,   Ca = H (Hᵀ a)
-    let a = g.transpose() * &d / reach;
-    let ha = half.transpose() * &a;
-    let variance = ha.norm_squared();
-    let ca = half * ha;
-    let share = if variance > 0.0 {
-        weighted(prior, &ca) / variance
-    } else {
-        0.0
-    };
-    Some(SizeSpread {
-        sigma: variance.sqrt(),
-        prior_share: share.clamp(0.0, 1.0),
-    })
 }
 
 /// vᵀ diag(w) v
