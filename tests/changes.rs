@@ -360,6 +360,27 @@ fn frames_of_one_pose_count_once() {
     assert!(finding(&plain, "frames-merged").is_none());
 }
 
+/// Held-out postures that are written eight times are no more postures.
+#[test]
+fn frames_of_a_held_out_pose_count_once() {
+    const CHECKS: &str = "robots/ripley/checks.csv";
+    let interval = |dir: &Scratch| {
+        let report = run(dir).1;
+        report["verification"]["held_out"]["expected"].clone()
+    };
+    let dir = Scratch::new().robot("ripley");
+    let plain = interval(&dir);
+    assert!(plain["high_m"].as_f64().is_some(), "{plain}");
+    let text = dir.read(CHECKS);
+    let mut header = true;
+    let lines = text.lines().flat_map(|line| {
+        let first = line.starts_with('#') || std::mem::take(&mut header);
+        std::iter::repeat_n(line, if first { 1 } else { 8 })
+    });
+    let copied = lines.collect::<Vec<_>>().join("\n") + "\n";
+    assert_eq!(interval(&dir.file(CHECKS, copied)), plain);
+}
+
 /// Every row three times, as a logger writes it that is faster than the robot: said how many are copies.
 #[test]
 fn copies_of_a_row_count_once_and_are_said() {

@@ -156,6 +156,22 @@ fn a_fleet_is_calibrated_and_compared_with_last_time() {
         .file("now/r004/r.yaml", "calib: 1\nrobots: {}\n")
         .file("now/r005/holds.csv", "no table\n");
     let batch = ["batch", "now/*/r.yaml", "--earlier", "last", "--out"];
+    let mistyped = [
+        "batch",
+        "now/*/r.yaml",
+        "--earlier",
+        "lost",
+        "--out",
+        "none",
+    ];
+    let refused = dir.calib_with(&mistyped).expect(2);
+    assert!(
+        refused
+            .stderr
+            .contains("lost: is no folder of an earlier batch"),
+        "{}",
+        refused.stderr
+    );
     let ran = dir
         .calib_with(&[&batch[..], &["tonight", "--jobs", "2"]].concat())
         .expect(0);

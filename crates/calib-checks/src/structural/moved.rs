@@ -76,10 +76,12 @@ impl Scan<'_> {
             scopes,
             |body| links[body].is_some(),
             |i, poses| {
-                self.corrected_units(h, i, &mut row);
-                if let Some(columns) = &columns {
-                    row.clear();
-                    row.extend(columns.iter().map(|column| self.row(i)[column.0]));
+                match &columns {
+                    Some(columns) => {
+                        row.clear();
+                        row.extend(columns.iter().map(|column| self.row(i)[column.0]));
+                    }
+                    None => self.corrected_units(h, i, &mut row),
                 }
                 walk.go(&self.data.chain, &row);
                 for (pose, link) in poses.iter_mut().zip(&links) {

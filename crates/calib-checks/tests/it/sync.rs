@@ -236,6 +236,42 @@ fn periodic_motion_is_refused() {
     );
 }
 
+/// A robot's script: it turns for a second and rests for 1.2 s, again and again, by another angle each time.
+#[test]
+fn postures_at_equal_intervals_are_no_periodic_motion() {
+    const EVERY: f64 = 2.2;
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let turns: Vec<f64> = (0..40).map(|_| rng.random_range(0.6..1.4)).collect();
+    let ends: Vec<f64> = turns
+        .iter()
+        .scan(0.0, |sum, turn| {
+            *sum += turn;
+            Some(*sum)
+        })
+        .collect();
+    let motion = |t: f64| {
+        let k = (t / EVERY).floor().max(0.0) as usize;
+        // Smooth from one posture to the next.
+        let x = (t - k as f64 * EVERY).clamp(0.0, 1.0);
+        let angle = ends[k] - turns[k] * (1.0 - x * x * (3.0 - 2.0 * x));
+        UnitQuaternion::from_scaled_axis(Vector3::z() * angle)
+    };
+    for seed in 0..4 {
+        let offset = 1.3 - f64::from(seed);
+        let (a, b) = tracks(offset, 0.0, u64::from(seed as u8), &motion);
+        let outcome = clock_offset(&a, &b, &OffsetSettings::default());
+        let OffsetOutcome::Found(map) = outcome else {
+            panic!("{seed}: {outcome:?}")
+        };
+        assert!(map.second > 0.9, "{seed}: {map:?}");
+        let off = map.to_a(30.0) - 30.0 - offset;
+        assert!(
+            off.abs() < 4.0 * map.offset_sigma.max(1e-3),
+            "{seed}: {map:?}"
+        );
+    }
+}
+
 #[test]
 fn what_cannot_be_aligned_is_said() {
     let still = |_: f64| UnitQuaternion::identity();

@@ -19,13 +19,13 @@ pub(crate) fn searched(fit: &MlFit) -> Vec<Finding> {
 }
 
 /// The ratio to state: the whole number that agrees with what was found, else what was found, to a fifth of its σ.
-fn stated(gear: &GearRatio) -> String {
-    let whole = gear.ratio.round();
-    if (gear.ratio - whole).abs() <= 2.0 * gear.sigma {
+fn stated(ratio: f64, sigma: f64) -> String {
+    let whole = ratio.round();
+    if (ratio - whole).abs() <= 2.0 * sigma {
         return format!("{whole}");
     }
-    let digits = (-(gear.sigma / 2.0).log10()).ceil().clamp(1.0, 6.0);
-    format!("{:.*}", digits as usize, gear.ratio)
+    let digits = (-(sigma / 2.0).log10()).ceil().clamp(1.0, 6.0);
+    format!("{:.*}", digits as usize, ratio)
 }
 
 fn finding(gear: &GearRatio) -> Finding {
@@ -33,7 +33,19 @@ fn finding(gear: &GearRatio) -> Finding {
         .with("joint", Fact::name(gear.name.clone()))
         .with("ratio", Fact::ratio(gear.ratio))
         .with("sigma", Fact::ratio(gear.sigma))
-        .with("stated", Fact::name(stated(gear)))
+        .with("stated", Fact::name(stated(gear.ratio, gear.sigma)))
         .with("amplitude", Fact::radians(gear.amplitude))
         .with("chance", Fact::ratio(gear.p_corrected))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::stated;
+
+    #[test]
+    fn a_whole_ratio_is_stated_where_it_agrees() {
+        assert_eq!(stated(101.04, 0.09), "101");
+        assert_eq!(stated(160.479, 0.086), "160.48");
+        assert_eq!(stated(100.3, 0.02), "100.30");
+    }
 }
