@@ -142,3 +142,46 @@ fn one_joint_is_named_alone_where_it_explains_nearly_all() {
     assert_eq!(one["facts"]["kind"], "joint", "{one:#}");
     assert_eq!(one["about"]["name"], "elbow", "{one:#}");
 }
+
+/// The zero of `elbow` is off by 10° in these tables.
+fn off_by_ten(tables: &[&str]) -> Scratch {
+    let joints = [("elbow", 10.0)];
+    let (first, others) = tables.split_first().expect("a table");
+    homed(&joints, (0, *first), others)
+}
+
+/// The one finding about a zero, its kind and its offset, degrees.
+fn zero(report: &Value) -> (&Value, f64) {
+    let about = |f: &&Value| f["id"] == "joint-offset";
+    let all = report["findings"].as_array().expect("findings").iter();
+    let found: Vec<&Value> = all.filter(about).collect();
+    let [one] = found[..] else {
+        panic!("{:#}", report["findings"]);
+    };
+    assert_eq!(one["about"]["name"], "elbow", "{one:#}");
+    let offset = one["facts"]["offset"]["value"].as_f64();
+    (one, offset.expect("an angle").to_degrees())
+}
+
+#[test]
+fn a_zero_that_is_off_in_all_recordings_is_found_by_the_fit_and_said() {
+    let all = [POSES, SWEEPS[0], SWEEPS[1], CHECKS];
+    let dir = off_by_ten(&all);
+    let report = run(&dir);
+    let (found, offset) = zero(&report);
+    assert_eq!(found["facts"]["kind"], "zero", "{found:#}");
+    assert_eq!(found["severity"], "warning", "{found:#}");
+    assert!((offset + 10.0).abs() < 1.0, "{offset}");
+    assert_eq!(report["verdict"], "accepted_with_warnings", "{report:#}");
+    // What the fit may not change is to be freed.
+    let free = "joint_offsets, joint_axes]";
+    let profile = dir.read(PROFILE);
+    assert!(profile.contains(free));
+    let dir = dir.file(PROFILE, profile.replace(free, "joint_axes]"));
+    dir.calib(["run", PROFILE, "--out", "held", "--force"]);
+    let report = dir.json("held/report.json");
+    let (found, _) = zero(&report);
+    assert_eq!(found["facts"]["kind"], "zero_held", "{found:#}");
+    assert_eq!(found["severity"], "error", "{found:#}");
+    assert_ne!(report["verdict"], "accepted");
+}

@@ -380,7 +380,13 @@ fn of_signs(scene: &Scene<'_>, assigned: &Assigned) -> Option<(Signs, f64)> {
             leading: Some(named),
             ..
         }
-        | Decision::Named(named) => (named.evidence.best, signs::is_of_signs(&named.correction)),
+        | Decision::Named(named) => {
+            // Where no mistake explains the data, a zero takes up part of any.
+            let is_zero = |s: &Scoped| matches!(s.hypothesis, Hypothesis::Zero { .. });
+            let of_zeros = named.correction.iter().all(is_zero);
+            let of_signs = of_zeros || signs::is_of_signs(&named.correction);
+            (named.evidence.best, of_signs)
+        }
         _ => return None,
     };
     let too_much = outcome.expected.is_some_and(|e| left > e.limit);

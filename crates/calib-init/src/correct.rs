@@ -49,7 +49,13 @@ pub fn mistake(
         }
         Hypothesis::Offset { joint: j, turns } => Mistake::Offset {
             joint: joint(j),
-            degrees: turns.angle().to_degrees(),
+            value: turns.angle(),
+            turns: true,
+        },
+        Hypothesis::Zero { joint: j, offset } => Mistake::Offset {
+            joint: joint(j),
+            value: offset,
+            turns: model.joints()[j.0].kind.turns(),
         },
         Hypothesis::RowShift { rows } => Mistake::Rows { rows },
         Hypothesis::Mirrored => Mistake::Mirrored,

@@ -35,12 +35,14 @@ pub enum Mistake {
         /// The unit that the values really have.
         unit: &'static str,
     },
-    /// A zero that is off by a multiple of 90°.
+    /// A zero that is off.
     Offset {
         /// The joint.
         joint: String,
-        /// What must be added, deg.
-        degrees: f64,
+        /// What must be added, rad or m.
+        value: f64,
+        /// Whether it turns.
+        turns: bool,
     },
     /// Joint values and tracker rows are paired off by some rows.
     Rows {

@@ -24,16 +24,20 @@ pub(crate) type Candidate = (Hypothesis, Vec<Scope>);
 
 /// Everything that is tried; the order is fixed.
 pub(crate) fn candidates(data: &Data) -> Vec<Candidate> {
-    let present = recordings_present(data);
-    let parts = parts(&present);
-    let mut everywhere = vec![Scope::All];
-    everywhere.extend(&parts);
+    let parts = parts(&recordings_present(data));
+    let everywhere = everywhere(data);
     let mut list: Vec<Candidate> = Vec::new();
     of_readings(data, &everywhere, &mut list);
     of_claims(data, &parts, &mut list);
     of_tracker(data, &everywhere, &parts, &mut list);
     of_missing(data, &mut list);
     list
+}
+
+/// All data, and the scopes that are a part of them.
+pub(super) fn everywhere(data: &Data) -> Vec<Scope> {
+    let parts = parts(&recordings_present(data));
+    std::iter::once(Scope::All).chain(parts).collect()
 }
 
 fn recordings_present(data: &Data) -> Vec<RecordingIndex> {

@@ -14,10 +14,11 @@ use super::ids::{JointIndex, SampleIndex};
 use super::jump::jump;
 use super::likelihood::{Opinion, errors_explain, has_unknowns, opinion};
 use super::naming::{Asked, EQUIVALENT_WITHIN, on_twin};
-use super::outcome::{Correction, Decision, Design, Evidence, Named, Options, Outcome};
+use super::outcome::{Correction, Decision, Design, Named, Options, Outcome};
+use super::pairs::name_pair;
 use super::ranking::{Ranking, distinct, few_samples, ratio};
 use super::readings::{WrongReadings, wrong_readings};
-use super::scan::{Scan, Score, Scored};
+use super::scan::{Scan, Scored};
 use super::screen::{Screened, screen};
 use super::swept::{at_rest, moved_after_all};
 use super::thinning::thinned;
@@ -180,7 +181,9 @@ fn beyond_hypotheses(
                 outcome.readings = wrong_readings(data, outcome, options);
             }
         }
-        Decision::Named(named) if named.evidence.ratio < options.pair_ratio => {
+        Decision::Named(named)
+            if named.evidence.ratio < options.pair_ratio || is_of_zeros(named) =>
+        {
             let ratio = named.evidence.ratio;
             let most = clearly_below(named.evidence.best, outcome, options);
             if let Some(found) = jump(data, outcome, most, options) {
@@ -212,6 +215,12 @@ fn beyond_hypotheses(
         }
         _ => {}
     }
+}
+
+/// A zero takes up much of a change at one row.
+fn is_of_zeros(named: &Named) -> bool {
+    let is_zero = |s: &Scoped| matches!(s.hypothesis, Hypothesis::Zero { .. });
+    named.correction.iter().any(is_zero)
 }
 
 /// What a change at one row may leave beside another explanation, m: less than that by the ratio that names a hypothesis, and than
@@ -372,95 +381,6 @@ fn maybe_unit(named: &Named, ranking: &Ranking) -> bool {
 
 fn undecided(leading: Option<Named>, ratio: f64) -> Decision {
     Decision::Undecided { leading, ratio }
-}
-
-/// Two corrections, with the residual after both.
-struct Pair {
-    correction: Correction,
-    score: Score,
-}
-
-/// The best pair: each of the leading hypotheses with every other.
-fn name_pair(asked: &Asked<'_>) -> Option<Named> {
-    let Asked {
-        data,
-        candidates,
-        ranking,
-        screened,
-        options,
-    } = *asked;
-    let mut pairs: Vec<Pair> = Vec::new();
-    for leader in distinct(&ranking.scored, options.beam) {
-        let first = apply(&leader.scoped, data);
-        // Densities multiply: the second score is relative to the data after the first correction.
-        let scale = leader.score.score / leader.score.rms.max(f64::MIN_POSITIVE);
-        for second in Ranking::of(&first, candidates, screened)
-            .scored
-            .into_iter()
-            .take(20)
-        {
-            if undoes(&leader.scoped, &second.scoped) {
-                continue;
-            }
-            let score = Score {
-                rms: second.score.rms,
-                score: second.score.score * scale,
-            };
-            pairs.push(Pair {
-                correction: vec![leader.scoped, second.scoped],
-                score,
-            });
-        }
-    }
-    pairs.sort_by(|a, b| a.score.score.total_cmp(&b.score.score));
-    let best = pairs.first().filter(|p| {
-        ranking.ratio(p.score.score) >= options.pair_ratio * few_samples(data, screened)
-    })?;
-    let twin = twin(data, &best.correction, screened);
-    let times = |p: &Pair| ratio(p.score.score, best.score.score);
-    let (mut equivalent, mut alternatives, mut next) = (Vec::new(), Vec::new(), None);
-    for pair in pairs[1..]
-        .iter()
-        .take_while(|p| times(p) < EQUIVALENT_WITHIN)
-    {
-        let same_set = pair.correction.iter().all(|s| best.correction.contains(s));
-        let corrected = apply_all(&pair.correction, &twin);
-        let fits = same_set || Scan::new(&corrected, screened).none().rms < options.twin_tolerance;
-        if fits && !same_set {
-            equivalent.push(pair.correction.clone());
-        } else if !fits {
-            next = next.or(Some(pair.score.rms));
-            if times(pair) < options.runner_up_ratio {
-                alternatives.push((pair.correction.clone(), times(pair)));
-            }
-        }
-    }
-    Some(Named {
-        left: asked.left(&apply_all(&best.correction, data)),
-        evidence: Evidence {
-            none: ranking.none.rms,
-            best: best.score.rms,
-            next,
-            ratio: ranking.ratio(best.score.score),
-        },
-        correction: best.correction.clone(),
-        equivalent,
-        alternatives,
-        within_expected: None,
-        allowing: None,
-    })
-}
-
-/// A correction and the one that takes it back.
-fn undoes(first: &Scoped, second: &Scoped) -> bool {
-    let same_kind =
-        std::mem::discriminant(&first.hypothesis) == std::mem::discriminant(&second.hypothesis);
-    // Two shifts of rows leave fewer rows, and nothing else.
-    let own = matches!(
-        first.hypothesis,
-        Hypothesis::TrackerMoved | Hypothesis::Remounted { .. } | Hypothesis::RowShift { .. }
-    );
-    first == second || (same_kind && own)
 }
 
 fn design(data: &Data) -> Design {

@@ -7,6 +7,7 @@ use super::ids::{RecordingIndex, SampleIndex};
 use super::outcome::Options;
 use super::scan::Scan;
 use super::special;
+use super::zeros;
 
 /// Joints that never moved, since no other data say where they stood, in all recordings or in one that is unlike the others; where something is `wrong`,
 /// in any, and axes of the model.
@@ -42,6 +43,16 @@ pub(super) fn further(
     more.retain(|(_, scopes)| !scopes.is_empty());
     if wrong && suspects.is_empty() {
         more.extend(of_axes(data));
+    }
+    if wrong {
+        let of_zeros = zeros::of_zeros(data, screened, options);
+        // One that only the suspects show may be everywhere.
+        let everywhere = |scope: &Scope| *scope == Scope::All || asked(scope);
+        more.extend(
+            of_zeros
+                .into_iter()
+                .filter(|(_, scopes)| scopes.iter().all(everywhere)),
+        );
     }
     more
 }

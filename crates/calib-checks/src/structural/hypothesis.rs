@@ -230,6 +230,13 @@ pub enum Hypothesis {
         /// What is to be added.
         turns: QuarterTurns,
     },
+    /// The zero of a joint that moves is off by any angle or length: `reading += offset`.
+    Zero {
+        /// Joint.
+        joint: JointIndex,
+        /// What is to be added, rad or m.
+        offset: f64,
+    },
     /// Readings and tracker data are paired one row off: row i needs the readings of row i − `rows`.
     RowShift {
         /// ±1 or ±2.
@@ -369,6 +376,7 @@ impl Hypothesis {
                 factor,
             } => (joint, 1.0, source, factor, 0.0),
             Self::Offset { joint, turns } => (joint, 1.0, joint, 0.0, turns.angle()),
+            Self::Zero { joint, offset } => (joint, 1.0, joint, 0.0, offset),
             _ => return None,
         };
         Some(Affine {

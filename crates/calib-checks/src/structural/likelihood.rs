@@ -134,6 +134,7 @@ pub(super) fn has_unknowns(hypothesis: &Hypothesis) -> bool {
             | Hypothesis::Remounted { .. }
             | Hypothesis::MissingColumn { .. }
             | Hypothesis::StoodAt { .. }
+            | Hypothesis::Zero { .. }
             | Hypothesis::TrackerUnit { .. }
     )
 }

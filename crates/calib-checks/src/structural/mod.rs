@@ -71,6 +71,7 @@ mod naming;
 mod nonlinear;
 mod order;
 mod outcome;
+mod pairs;
 mod ranking;
 mod readings;
 mod registration;
@@ -85,6 +86,7 @@ mod tested;
 mod thinning;
 mod twin;
 mod whitened;
+mod zeros;
 
 pub use apply::{apply, apply_all};
 pub use chain::{Chain, ChainError, ChainJoint, Motion};

@@ -10,7 +10,7 @@ use super::ids::JointIndex;
 use super::scan::{Scan, Score, Scored};
 use super::special;
 
-/// A frame or a mount of a recording's own takes up nominal errors: clean sweeps in recordings of their own gained up to 2.
+/// A frame or a mount of a recording's own takes up nominal errors, and a zero part of whatever is wrong: clean sweeps in recordings of their own gained up to 2.
 /// Such a hypothesis must gain this many times as much as others, 3 instead of 1.5.
 const OWN_FRAME: f64 = 2.0;
 
@@ -26,7 +26,7 @@ pub(crate) fn score(scan: &Scan<'_>, candidates: &[Candidate], enough: f64) -> V
         };
         if matches!(
             hypothesis,
-            Hypothesis::TrackerMoved | Hypothesis::Remounted { .. }
+            Hypothesis::TrackerMoved | Hypothesis::Remounted { .. } | Hypothesis::Zero { .. }
         ) {
             scored.iter_mut().for_each(|s| s.score.score *= OWN_FRAME);
         }

@@ -10,3 +10,4 @@ mod robots;
 mod structural;
 mod sync;
 mod templates;
+mod zeros;

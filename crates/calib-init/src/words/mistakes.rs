@@ -65,10 +65,15 @@ fn found(mistake: &Mistake) -> String {
         Mistake::TrackerUnit { unit } => {
             format!("The tracker's lengths are in {}.", length_unit(unit))
         }
-        Mistake::Offset { joint, degrees } => format!(
-            "The zero of `{joint}` is off: {} must be added.",
-            number::plain(degrees.to_radians(), Unit::Radian)
-        ),
+        Mistake::Offset {
+            joint,
+            value,
+            turns,
+        } => {
+            let unit = if *turns { Unit::Radian } else { Unit::Meter };
+            let value = number::plain(*value, unit);
+            format!("The zero of `{joint}` is off: {value} must be added.")
+        }
         Mistake::Rows { rows } => format!(
             "Joint values and tracker rows are paired {} off.",
             plural(rows.unsigned_abs().into(), "row", "rows")

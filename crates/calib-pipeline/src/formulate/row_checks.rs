@@ -8,13 +8,13 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use calib_checks::model::{Spoiled, SpoiledRow, spoiled_rows};
-use calib_checks::structural::{Chain, Deviation, deviations};
+use calib_checks::structural::{Chain, Deviation, Hypothesis, apply_all, deviations};
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::Usage;
 use calib_urdf::LinkId;
 use rayon::prelude::*;
 
-use crate::formulate::structural::{Coupling, Layout, Structural, coupled};
+use crate::formulate::structural::{Layout, Structural, coupled};
 use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::tracks::BodyTrack;
 
@@ -91,7 +91,7 @@ pub fn rows<'a>(
         }
         let q: Vec<&Vec<f64>> = loaded.q.iter().flatten().collect();
         let at = |q: &[f64]| {
-            let q = with_couplings(q, &structural.couplings);
+            let q = corrected(q, structural);
             inputs.robot.model.root_from_link(&q, link)
         };
         let poses: Vec<_> = q.iter().map(|q| at(q)).collect();
@@ -150,10 +150,17 @@ fn row_findings(rows: &Rows<'_>) -> Vec<Finding> {
     .collect()
 }
 
-fn with_couplings(q: &[f64], couplings: &[Coupling]) -> Vec<f64> {
-    let mut moved = q.to_vec();
-    for c in couplings {
-        moved[c.joint.0] += c.factor * q[c.source.0];
+/// Joint positions with the zeros and the couplings that the fit estimates.
+fn corrected(q: &[f64], structural: &Structural) -> Vec<f64> {
+    let mut read = q.to_vec();
+    for scoped in &structural.zeros {
+        if let Hypothesis::Zero { joint, offset } = scoped.hypothesis {
+            read[joint.0] += offset;
+        }
+    }
+    let mut moved = read.clone();
+    for c in &structural.couplings {
+        moved[c.joint.0] += c.factor * read[c.source.0];
     }
     moved
 }
@@ -199,7 +206,7 @@ fn deviating<'a>(
     let chain = coupled(chain, &structural.couplings);
     let validation = |of: &Spoilt<'_>| of.loaded.spec.usage == Usage::Validation;
     let layout = Layout::new(inputs, tracks, &chain, all.iter().any(validation));
-    let Ok(found) = deviations(&layout.data) else {
+    let Ok(found) = deviations(&apply_all(&structural.zeros, &layout.data)) else {
         return Vec::new();
     };
     // (recording, row, body) → deviation

@@ -75,6 +75,10 @@ fn of_hypothesis(layout: &Layout<'_>, hypothesis: &Hypothesis) -> String {
             };
             format!("offset({}, {degrees} deg)", joint(j))
         }
+        Hypothesis::Zero { joint: j, offset } => {
+            let (offset, unit) = layout.shown(j, offset);
+            format!("zero({}, {offset:+.2} {unit})", joint(j))
+        }
         Hypothesis::Lag { recording, seconds } => {
             let name = &layout.recordings[recording.0].name;
             format!("lag({name}, {:+.1} ms)", 1e3 * seconds)

@@ -145,6 +145,18 @@ impl<'a> Layout<'a> {
         }
     }
 
+    /// Whether the fit estimates the zero of a joint that the recordings move.
+    #[must_use]
+    pub fn frees_zero(&self, joint: JointIndex) -> bool {
+        let model = &self.inputs.robot.model;
+        let Some(id) = model.joint_ids().nth(joint.0) else {
+            return false;
+        };
+        let slides = !model.joint(id).kind.turns();
+        let own = self.inputs.robot.profile.solve.free_set(id, true, slides);
+        own.effects.iter().any(|free| free.effect.id == "offset")
+    }
+
     /// Unit of a joint's share in the motion of another: none between two that turn or two that slide.
     #[must_use]
     pub fn unit_of_share(&self, joint: JointIndex, source: JointIndex) -> Unit {

@@ -12,13 +12,13 @@ use super::layout::Layout;
 use crate::formulate::late::with_late_joint;
 use crate::prepare::aligned::ClockUnknowns;
 
-/// Findings beside the decision.
+/// Findings beside the decision; `consistent`: nothing but what the fit estimates is named.
 #[must_use]
-pub fn findings(layout: &Layout<'_>, outcome: &Outcome) -> Vec<Finding> {
+pub fn findings(layout: &Layout<'_>, outcome: &Outcome, consistent: bool) -> Vec<Finding> {
     let mut findings = assumed_zero(layout, outcome);
     findings.extend(not_checked(layout, outcome));
     // A mistake that is named comes first: what is left may be its trace.
-    if matches!(outcome.decision, Decision::Consistent { .. }) {
+    if consistent {
         let continuous = outcome.continuous.as_ref();
         findings.extend(continuous.and_then(|c| continuous_finding(layout, c)));
         findings.extend(invisible(layout, outcome));

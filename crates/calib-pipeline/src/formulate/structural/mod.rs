@@ -16,8 +16,8 @@ mod without;
 use std::collections::{BTreeMap, BTreeSet};
 
 use calib_checks::structural::{
-    Chain, Decision, JointIndex, Options, Outcome, RecordingIndex, Scope, WrongReadings, explain,
-    registration_residual, thin,
+    Chain, Correction, Decision, Hypothesis, JointIndex, Options, Outcome, RecordingIndex, Scope,
+    Scoped, WrongReadings, apply_all, explain, registration_residual, thin,
 };
 use calib_finding::{Fact, Finding, Severity, Subject, catalog};
 use calib_profile::Usage;
@@ -45,6 +45,8 @@ pub struct Structural {
     pub rows_count: bool,
     /// Couplings that the profile declares.
     pub couplings: Vec<Coupling>,
+    /// Zeros that are off, where that is all that is wrong and the fit estimates them.
+    pub zeros: Correction,
 }
 
 /// The nominal robot with the couplings that the profile declares; `None` where its joints are no tree.
@@ -70,6 +72,7 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
         findings: Vec::new(),
         rows_count: true,
         couplings,
+        zeros: Vec::new(),
     };
     let mut options = Options::default();
     if let Some(sigma) = inputs.robot.profile.tracker.marker_sigma {
@@ -84,16 +87,19 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
         return found;
     };
     found.findings.extend(decision(&layout, &outcome));
-    let mut beside = limits::findings(&layout, &outcome);
+    found.zeros = zeros_of_fit(&layout, &outcome);
+    let consistent = matches!(outcome.decision, Decision::Consistent { .. });
+    let consistent = consistent || !found.zeros.is_empty();
+    let mut beside = limits::findings(&layout, &outcome, consistent);
     beside.retain(|finding| !without::says(&found.findings, finding));
     found.findings.extend(beside);
-    found.rows_count = matches!(
-        outcome.decision,
-        Decision::Consistent { .. } | Decision::TooFewData { .. }
-    );
+    let too_few = matches!(outcome.decision, Decision::TooFewData { .. });
+    found.rows_count = consistent || too_few;
     if found.rows_count {
-        let all = Layout::new(inputs, tracks, &chain, true);
-        let errors = of_validation(&all, &outcome, options);
+        let mut all = Layout::new(inputs, tracks, &chain, true);
+        all.data = apply_all(&found.zeros, &all.data);
+        let (errors, zeros) = of_validation(&all, &outcome, options);
+        found.zeros.extend(zeros);
         // A change at one row looks like a gain in the rows around it.
         if errors
             .iter()
@@ -107,15 +113,39 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
     found
 }
 
-/// What is wrong in the recordings of the validation alone, where they raise the residual of the fitted ones.
-fn of_validation(all: &Layout<'_>, fitted: &Outcome, mut options: Options) -> Vec<Finding> {
+/// The corrections that are named, where all of them are zeros that the fit estimates.
+fn zeros_of_fit(layout: &Layout<'_>, outcome: &Outcome) -> Correction {
+    let is_zero = |scoped: &Scoped| match scoped.hypothesis {
+        Hypothesis::Zero { joint, offset } => {
+            let slides = layout.data.chain.turns(joint.0) == Some(false);
+            let near = slides || offset.abs() <= named::FAR;
+            scoped.scope == Scope::All && near && layout.frees_zero(joint)
+        }
+        _ => false,
+    };
+    match &outcome.decision {
+        Decision::Named(named) if named.correction.iter().all(is_zero) => named.correction.clone(),
+        _ => Vec::new(),
+    }
+}
+
+/// What is wrong in the recordings of the validation alone, where they raise the residual of the fitted ones, and zeros that only they show.
+fn of_validation(
+    all: &Layout<'_>,
+    fitted: &Outcome,
+    mut options: Options,
+) -> (Vec<Finding>, Correction) {
     let held_out = |r: &&Loaded| r.spec.usage == Usage::Validation;
     if !all.recordings.iter().any(held_out) {
-        return Vec::new();
+        return (Vec::new(), Vec::new());
     }
     let rms = registration_residual(&thin(&all.data, options.most_rows));
-    if rms.is_ok_and(|rms| rms < RAISED * fitted.rms) {
-        return Vec::new();
+    let of_fitted = match &fitted.decision {
+        Decision::Named(named) => named.evidence.best,
+        _ => fitted.rms,
+    };
+    if rms.is_ok_and(|rms| rms < RAISED * of_fitted) {
+        return (Vec::new(), Vec::new());
     }
     (options.list_invisible, options.score_tests) = (false, false);
     // Fitted recordings that were too few to be judged are judged with the others.
@@ -125,11 +155,13 @@ fn of_validation(all: &Layout<'_>, fitted: &Outcome, mut options: Options) -> Ve
         options.suspects = suspects.map(|(r, _)| RecordingIndex(r)).collect();
     }
     let Ok(outcome) = explain(&all.data, &options) else {
-        return Vec::new();
+        return (Vec::new(), Vec::new());
     };
     // A large residual alone was judged by the fitted recordings.
-    let errors = decision(all, &outcome).into_iter();
-    errors.filter(|f| f.severity == Severity::Error).collect()
+    let zeros = zeros_of_fit(all, &outcome);
+    let mut findings = decision(all, &outcome);
+    findings.retain(|f| f.severity == Severity::Error || !zeros.is_empty());
+    (findings, zeros)
 }
 
 /// The joint whose readings are wrong.

@@ -2,12 +2,15 @@
 
 use calib_checks::structural::{
     ColumnOrder, Correction, Hypothesis, JointIndex, Length, Named, Outcome, PoseMistake,
-    RecordingIndex, Scoped, UnitMistake,
+    RecordingIndex, Scope, Scoped, UnitMistake,
 };
 use calib_finding::{About, Fact, Finding, Id, Subject, catalog};
 
 use super::codes;
 use super::layout::Layout;
+
+/// A fit finds a zero that is off by up to this, rad: beyond 75° some do not converge.
+pub(super) const FAR: f64 = std::f64::consts::FRAC_PI_4;
 
 /// The findings of a named correction.
 #[must_use]
@@ -111,6 +114,27 @@ fn several(
     .with("entries", Fact::name(entries.join(", ")))
 }
 
+/// The zero of a joint is off: whether the fit finds it decides what is to be done.
+fn zero(layout: &Layout<'_>, scope: Scope, joint: JointIndex, offset: f64) -> Finding {
+    let turns = layout.data.chain.turns(joint.0) != Some(false);
+    let kind = match (scope, layout.frees_zero(joint)) {
+        (Scope::All, _) if turns && offset.abs() > FAR => "turned",
+        (Scope::All, true) => "zero",
+        (Scope::All, false) => "zero_held",
+        _ => "zero_of_some",
+    };
+    let some = (scope != Scope::All).then(|| layout.recordings_in(scope));
+    let offset = match turns {
+        true => Fact::radians(offset),
+        false => Fact::meters(offset),
+    };
+    let subject = Subject::joint(layout.joint(joint));
+    Finding::of_kind(catalog::JOINT_OFFSET, kind, subject)
+        .with("joint", Fact::name(layout.joint(joint)))
+        .with("offset", offset)
+        .with_some("recordings", some.map(Fact::names))
+}
+
 /// Id, subject and values of one hypothesis.
 fn of_hypothesis(layout: &Layout<'_>, outcome: &Outcome, scoped: &Scoped) -> Finding {
     let of_joint = |id: Id, joint: JointIndex| {
@@ -150,6 +174,7 @@ fn of_hypothesis(layout: &Layout<'_>, outcome: &Outcome, scoped: &Scoped) -> Fin
         )
         .with("joint", Fact::name(layout.joint(joint)))
         .with("offset", Fact::radians(turns.angle())),
+        Hypothesis::Zero { joint, offset } => zero(layout, scoped.scope, joint, offset),
         Hypothesis::Coupling {
             joint,
             source,

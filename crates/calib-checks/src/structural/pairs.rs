@@ -1,0 +1,105 @@
+//! Two mistakes at once: each of the leading hypotheses with every other.
+
+use super::apply::{apply, apply_all};
+use super::hypothesis::{Hypothesis, Scoped};
+use super::naming::{Asked, EQUIVALENT_WITHIN};
+use super::outcome::{Correction, Evidence, Named};
+use super::ranking::{Ranking, distinct, few_samples, ratio};
+use super::scan::{Scan, Score};
+use super::twin::twin;
+use super::zeros;
+
+/// Two corrections, with the residual after both.
+struct Pair {
+    correction: Correction,
+    score: Score,
+}
+
+/// The best pair: each of the leading hypotheses with every other.
+pub(super) fn name_pair(asked: &Asked<'_>) -> Option<Named> {
+    let Asked {
+        data,
+        candidates,
+        ranking,
+        screened,
+        options,
+    } = *asked;
+    let mut pairs: Vec<Pair> = Vec::new();
+    for leader in distinct(&ranking.scored, options.beam) {
+        let first = apply(&leader.scoped, data);
+        // Beside one zero that is off, another is another one.
+        let again = match leader.scoped.hypothesis {
+            Hypothesis::Zero { .. } => Some(zeros::again(candidates, &first, screened, options)),
+            _ => None,
+        };
+        let candidates = again.as_deref().unwrap_or(candidates);
+        // Densities multiply: the second score is relative to the data after the first correction.
+        let scale = leader.score.score / leader.score.rms.max(f64::MIN_POSITIVE);
+        for second in Ranking::of(&first, candidates, screened)
+            .scored
+            .into_iter()
+            .take(20)
+        {
+            if undoes(&leader.scoped, &second.scoped) {
+                continue;
+            }
+            let score = Score {
+                rms: second.score.rms,
+                score: second.score.score * scale,
+            };
+            pairs.push(Pair {
+                correction: vec![leader.scoped, second.scoped],
+                score,
+            });
+        }
+    }
+    pairs.sort_by(|a, b| a.score.score.total_cmp(&b.score.score));
+    let best = pairs.first().filter(|p| {
+        ranking.ratio(p.score.score) >= options.pair_ratio * few_samples(data, screened)
+    })?;
+    let twin = twin(data, &best.correction, screened);
+    let times = |p: &Pair| ratio(p.score.score, best.score.score);
+    let (mut equivalent, mut alternatives, mut next) = (Vec::new(), Vec::new(), None);
+    for pair in pairs[1..]
+        .iter()
+        .take_while(|p| times(p) < EQUIVALENT_WITHIN)
+    {
+        let same_set = pair.correction.iter().all(|s| best.correction.contains(s));
+        let corrected = apply_all(&pair.correction, &twin);
+        let fits = same_set || Scan::new(&corrected, screened).none().rms < options.twin_tolerance;
+        if fits && !same_set {
+            equivalent.push(pair.correction.clone());
+        } else if !fits {
+            next = next.or(Some(pair.score.rms));
+            if times(pair) < options.runner_up_ratio {
+                alternatives.push((pair.correction.clone(), times(pair)));
+            }
+        }
+    }
+    Some(Named {
+        left: asked.left(&apply_all(&best.correction, data)),
+        evidence: Evidence {
+            none: ranking.none.rms,
+            best: best.score.rms,
+            next,
+            ratio: ranking.ratio(best.score.score),
+        },
+        correction: best.correction.clone(),
+        equivalent,
+        alternatives,
+        within_expected: None,
+        allowing: None,
+    })
+}
+
+/// A correction and the one that takes it back.
+fn undoes(first: &Scoped, second: &Scoped) -> bool {
+    let same_kind =
+        std::mem::discriminant(&first.hypothesis) == std::mem::discriminant(&second.hypothesis);
+    // Two shifts of rows leave fewer rows, and nothing else.
+    let own = matches!(
+        first.hypothesis,
+        Hypothesis::TrackerMoved | Hypothesis::Remounted { .. } | Hypothesis::RowShift { .. }
+    );
+    first == second || (same_kind && own)
+}
