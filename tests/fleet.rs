@@ -257,6 +257,20 @@ fn a_fleet_is_calibrated_and_compared_with_last_time() {
             .expect(0);
         same(&first, &results(&dir, &out));
     }
+
+    // A recording that is another one by now.
+    let recording = "now/r002/checks.csv";
+    let text = dir.read(recording);
+    let (_, but_the_last) = text
+        .trim_end()
+        .rsplit_once('\n')
+        .map(|(a, b)| (b, a))
+        .expect("rows");
+    std::fs::write(dir.path(recording), format!("{but_the_last}\n")).expect("written");
+    let from = ["divided-2", "--from", "divided-2.parquet"];
+    let refused = dir.calib_with(&[&batch[..], &from].concat()).expect(3);
+    let said = "now/r002/checks.csv: the shard with robot `r002` was made from another version of this file";
+    assert!(refused.stderr.contains(said), "{}", refused.stderr);
 }
 
 /// Robots that were calibrated on machines without a common disk: the bytes of the batch on one.

@@ -59,6 +59,17 @@ pub enum BatchError {
         /// What is wrong.
         fault: FleetFault,
     },
+    /// A shard was made from a file that is another one now.
+    #[error(
+        "{}: the shard with robot `{robot}` was made from another version of this file\n  help: make that shard again with `--shard I/N --restart`, and merge again",
+        path.display()
+    )]
+    Changed {
+        /// The robot.
+        robot: String,
+        /// The file.
+        path: PathBuf,
+    },
     /// Files, shards and threads.
     #[error(transparent)]
     Work(#[from] FleetError),
@@ -95,6 +106,7 @@ impl BatchError {
     pub fn exit_code(&self) -> ExitCode {
         match self {
             Self::Fleet { .. } => ExitCode::Usage,
+            Self::Changed { .. } => ExitCode::Data,
             Self::Work(error) => error.exit_code(),
         }
     }
@@ -104,6 +116,7 @@ impl BatchError {
     pub fn path(&self) -> Option<&Path> {
         match self {
             Self::Fleet { fleet, .. } => Some(Path::new(fleet)),
+            Self::Changed { path, .. } => Some(path),
             Self::Work(error) => error.path(),
         }
     }

@@ -100,12 +100,20 @@ impl Batch<'_> {
     /// Writes the tables and the page from merged shards, without calibrating.
     ///
     /// # Errors
-    /// [`BatchError`] where they are not those of this batch.
+    /// [`BatchError`] where they are not those of this batch, or of files that are others now.
     pub fn from(&self, merged: &Path) -> Result<Files, BatchError> {
         let folder = ResultsFolder::open(self.out)?;
         let mut files = files::Writing::new(folder, self.out)?;
-        for robot in results::<Robot>(merged, &self.identity())? {
-            files.add(&robot?)?;
+        for (place, robot) in results::<Robot>(merged, &self.identity())?.enumerate() {
+            let robot = robot?;
+            let member = self.members.get(place);
+            if let Some(path) = member.and_then(|member| one::changed(member, &robot)) {
+                return Err(BatchError::Changed {
+                    robot: robot.name,
+                    path,
+                });
+            }
+            files.add(&robot)?;
         }
         files.write()
     }
@@ -141,6 +149,7 @@ impl Batch<'_> {
             let row = self.row(member).map_err(|error| match error {
                 BatchError::Work(error) => error,
                 BatchError::Fleet { fleet, .. } => FleetError::Lost { path: fleet.into() },
+                BatchError::Changed { path, .. } => FleetError::Lost { path },
             })?;
             Ok(Finished {
                 unit,

@@ -194,6 +194,17 @@ pub(super) fn folder(out: &Path, member: &Member) -> PathBuf {
     out.join(super::ROBOTS).join(&*member.name)
 }
 
+/// The first file that is there and is another one than the row was made from.
+pub(super) fn changed(member: &Member, robot: &Robot) -> Option<PathBuf> {
+    let beside = folder_of(&member.profile);
+    let files = robot.inputs.iter().map(|input| {
+        let path = beside.join(&input.path);
+        (sha256_of(&path).filter(|own| *own != input.sha256), path)
+    });
+    let mut changed = files.filter_map(|(other, path)| other.map(|_| path));
+    changed.next()
+}
+
 /// SHA-256 of a file; none where it cannot be read.
 pub(super) fn sha256_of(path: &Path) -> Option<String> {
     let bytes = input::read(path, LARGEST_INPUT).ok()?;
