@@ -25,18 +25,20 @@
 
 use std::sync::Arc;
 
-use nalgebra::DMatrix;
+use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use crate::analysis::solution::{Solution, describe_parameters};
 use crate::graph::measurement::MeasurementKind;
 use crate::solve::equations::Workspace;
-use crate::solve::whitened::{Whitened, covariance_of};
+use crate::solve::whitened::{Whitened, covariance_of, root_of};
 
 mod found;
+mod posterior;
 mod scaled;
 
 pub use found::{Dependence, MemoryOf};
+use posterior::posterior;
 use scaled::{Keys, Scaled, Unnumbered, scaled_sample};
 
 /// Changes the whitened residuals of a sample.
@@ -177,8 +179,8 @@ impl Solution {
         Some(found)
     }
 
-    /// The same solution with the uncertainty that it has under noise with a memory: equation (2), for parameters and
-    /// everything derived from them. `None` when the model cannot be evaluated.
+    /// The same solution with the uncertainty that it has under noise with a memory: equation (2), where priors say less than the data, and (6) of `posterior`
+    /// where they say more, for parameters and everything derived from them. `None` when the model cannot be evaluated.
     #[must_use]
     pub fn under(&self, dependence: &Dependence, borders: &[usize]) -> Option<Self> {
         // Σ_s N_sᵀ k_s, earlier and later samples alike
@@ -191,17 +193,34 @@ impl Solution {
         });
         let added = &added + added.transpose();
         let mut out = self.clone();
-        // C = R Rᵀ. Memory of both signs could in rare directions cancel: it is never taken for information. Which directions those are is asked in units of
+        let h = self.information.curvature(&self.model);
+        let root = root_of(&h)?;
+        // Memory of both signs could in rare directions cancel: it is never taken for information. Which directions those are is asked in units of
         // C: in those of the parameters, rounding would decide where it adds next to nothing.
-        let root = self.half_covariance();
         let more = positive(&(root.transpose() * added * &root));
-        let more = &root * more * root.transpose();
-        out.information.covariance = (&self.information.covariance + more) * dependence.level;
+        // Noise of another form than the weights have, and widths of priors, have made the covariance larger than C.
+        let inverse = root.clone().try_inverse()?;
+        let wider = &self.information.covariance - &root * root.transpose();
+        let more = more + positive(&(&inverse * wider * inverse.transpose()));
+        let priors = root.transpose() * DMatrix::from_diagonal(&self.prior_information()) * &root;
+        let known = posterior(&priors, &more, dependence.level, &(inverse * self.off()))?;
+        out.information.covariance = &root * known * root.transpose();
         let described = describe_parameters(&out.model, &out.values, &out.information);
         for (parameter, described) in out.parameters.iter_mut().zip(described) {
             parameter.sigma = described.sigma;
         }
         Some(out)
+    }
+
+    /// x̂ − x₀: deviations from the means of the priors; from where those without a prior are said to deviate does not matter.
+    fn off(&self) -> DVector<f64> {
+        let free = self.model.free_parameters();
+        let parameters = self.model.problem().parameters();
+        let off = free.iter().map(|p| match parameters[*p].prior_sigma {
+            Some(_) => self.values.0[*p] - parameters[*p].nominal,
+            None => 0.0,
+        });
+        DVector::from_iterator(free.len(), off)
     }
 
     /// The first samples, at most so many.

@@ -184,7 +184,7 @@ impl Solution {
     }
 
     /// Diagonal of P: 1/σ² of the priors.
-    fn prior_information(&self) -> DVector<f64> {
+    pub(crate) fn prior_information(&self) -> DVector<f64> {
         let parameters = self.model.problem().parameters();
         let of = |p: &usize| parameters[*p].prior_sigma.map_or(0.0, |s| s.powi(-2));
         let free = self.model.free_parameters();

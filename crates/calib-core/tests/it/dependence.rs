@@ -242,3 +242,44 @@ fn what_a_memory_adds_does_not_depend_on_rounding() {
     }
     assert!(found > 5, "{found}");
 }
+
+/// A covariance that allows for noise of another form already, as that of the clusters does, is added to: a product of the two would be many times larger.
+#[test]
+fn memory_adds_to_a_covariance_that_is_wider_already() {
+    let case = case(Seen::Markers, 5, 150, 0.8);
+    let found = case.solution.dependence(&[]).expect("enough samples");
+    assert!(found.is_significant(), "{found:?}");
+    let wide = case.solution.with_cluster_covariance().expect("evaluable");
+    let sigmas = |solution: &Solution| -> Vec<f64> {
+        let of = solution.parameters.iter().filter_map(|p| p.sigma);
+        of.collect()
+    };
+    let under = |solution: &Solution| sigmas(&solution.under(&found, &[]).expect("evaluable"));
+    let (plain, wider) = (sigmas(&case.solution), sigmas(&wide));
+    let (mended, both) = (under(&case.solution), under(&wide));
+    let mut apart = 0;
+    for i in 0..plain.len() {
+        let expected =
+            mended[i].powi(2) + found.level * (wider[i].powi(2) - plain[i].powi(2)).max(0.0);
+        // Priors take a little of it.
+        assert!(
+            both[i].powi(2) < 1.02 * expected,
+            "{i}: {} {} {} {}",
+            plain[i],
+            wider[i],
+            mended[i],
+            both[i]
+        );
+        apart += usize::from(wider[i] > 1.05 * plain[i]);
+    }
+    assert!(apart >= 3, "{apart} are wider");
+    // No parameter is known worse than its prior says, but for how far the estimate went.
+    let parameters = case.h.problem.parameters();
+    for (parameter, sigma) in case.solution.parameters.iter().zip(&both) {
+        let prior = parameters.iter().find(|p| p.name == parameter.name);
+        if let Some(prior) = prior.and_then(|p| p.prior_sigma) {
+            let off = parameter.value - parameter.nominal;
+            assert!(*sigma < 1.001 * prior.hypot(off), "{}", parameter.name);
+        }
+    }
+}

@@ -32,13 +32,13 @@ super::topic! {
             "Secure the tracker and the robot's stand, and record again; until then keep only the rows of one side.";
         "joint": Warning,
             "The zero of this joint changed by {angle} ± {sigma_angle} between row {before}[[ of `{before_in}`]] and row {row}.[[ Nearly as likely: {rivals:code} moved.]][[ Nearly as likely: the zeros of {zeros:code} changed.]][[ An effect explains the data as well: {alternatives:code}.]][[ Missing physics explains as much: `{physics}`.]]",
-            "Check the joint's encoder and its coupling, home the robot, and record again.";
+            "Check the joint's encoder and its coupling, and whether the robot took up or put down a load there. Home it, and record again.";
         "axis": Warning,
             "The zero of this joint changed by {distance} ± {sigma} between row {before}[[ of `{before_in}`]] and row {row}.[[ Nearly as likely: {rivals:code} moved.]][[ Nearly as likely: the zeros of {zeros:code} changed.]][[ An effect explains the data as well: {alternatives:code}.]][[ Missing physics explains as much: `{physics}`.]]",
-            "Check the joint's encoder and its coupling, home the robot, and record again.";
+            "Check the joint's encoder and its coupling, and whether the robot took up or put down a load there. Home it, and record again.";
         "zeros": Warning,
             "The zeros of joints {joints:code} changed between row {before}[[ of `{before_in}`]] and row {row}, most clearly that of `{joint}`: by [[{angle} ± {sigma_angle}]][[{distance} ± {sigma}]].[[ Nearly as likely: {rivals:code} moved.]][[ An effect explains the data as well: {alternatives:code}.]][[ Missing physics explains as much: `{physics}`.]]",
-            "If the robot was homed or its controller restarted in between, its zeros are those of one homing: record everything after one homing, or keep only the rows of one side. Otherwise check the encoders and couplings of these joints.";
+            "If the robot was homed or its controller restarted in between, its zeros are those of one homing: record everything after one homing, or keep only the rows of one side. Otherwise check the encoders and couplings of these joints, and whether the robot took up or put down a load there.";
         "tracker-far": Error,
             "The tracker, or the whole robot, moved by {distance} and {angle} between row {before} and row {row}[[; {later:code} came after]]: with that the recordings fit the nominal robot to {best} rms, without it to {none} rms, where nominal errors explain {limit}.[[ Nearly as likely: {rivals:code} moved.]]",
             "Secure the tracker and the robot's stand, and record again; until then keep only the rows of one side.";
