@@ -767,6 +767,16 @@ fn what_does_not_fit_is_refused() {
         3,
     );
     tell(
+        "another axis",
+        dir().edit(
+            "arm.urdf",
+            "<axis xyz=\"0 1 0\"/>",
+            "<axis xyz=\"0 -1 0\"/>",
+        ),
+        &apply,
+        3,
+    );
+    tell(
         "a joint less",
         dir().edit("arm.urdf", "name=\"wrist\"", "name=\"wirst\""),
         &apply,

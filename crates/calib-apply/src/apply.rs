@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 use calib_urdf::rpy::{rotation_from_rpy, rpy_from_rotation};
-use calib_urdf::{ModelDiff, Patched, UrdfEdit, diff_origins};
+use calib_urdf::{JointDiff, ModelDiff, Patched, RobotModel, UrdfEdit, diff_models, diff_origins};
 use nalgebra::Isometry3;
 
 use crate::change::{Destination, FileChange};
@@ -71,6 +71,7 @@ pub fn apply(request: &ApplyRequest) -> Result<Applied, ApplyError> {
         }
         target.recover(&mut notes)?;
     }
+    same_kinematics(&result, &target)?;
     let edits = result.edits(target.kind, &mut notes);
     let (patched, state) = match patched(&result, &mut target, &edits, &mut notes) {
         Err(ApplyError::PartlyApplied { target: file, .. })
@@ -122,6 +123,41 @@ pub fn apply(request: &ApplyRequest) -> Result<Applied, ApplyError> {
     };
     files::write(&mut applied.files, &request.destination)?;
     Ok(applied)
+}
+
+/// A URDF whose joints of the same names turn about other axes, slide, or connect other links is of another robot, whatever its origins are.
+fn same_kinematics(result: &Calibrated, target: &Target) -> Result<(), ApplyError> {
+    // What cannot be read is refused where it is patched; a xacro and a YAML tell origins alone.
+    let name = target.path.display().to_string();
+    let read = (target.kind == Kind::Urdf).then(|| RobotModel::from_urdf_text(&target.text, &name));
+    let Some(Ok(there)) = read else {
+        return Ok(());
+    };
+    let found = diff_models(&result.before, &there).joints;
+    let moves = |joint: &str| {
+        let mut joints = result.before.joints().iter();
+        joints.any(|own| own.name == joint && own.kind.axis().is_some())
+    };
+    let differs = |joint: &JointDiff| {
+        let turns = |kind: &str| ["revolute", "continuous"].contains(&kind);
+        let kind = joint.kind.as_ref();
+        joint.axis_deg.is_some()
+            || kind.is_some_and(|kind| !(turns(kind.from) && turns(kind.to)))
+            || joint.parent.is_some()
+            || joint.child.is_some()
+    };
+    let others: Vec<String> = found
+        .into_iter()
+        .filter(|joint| moves(&joint.joint) && differs(joint))
+        .map(|joint| joint.joint)
+        .collect();
+    match others.is_empty() {
+        true => Ok(()),
+        false => Err(ApplyError::OtherKinematics {
+            target: target.path.clone(),
+            joints: others,
+        }),
+    }
 }
 
 /// The target after the edits. Where it holds an earlier change of ours and the calibration did not start from that, the earlier change

@@ -145,6 +145,17 @@ pub enum ApplyError {
         /// What differs, in the order of the joints' names.
         others: Vec<OriginDifference>,
     },
+    /// Joints of the target are others than those that were calibrated.
+    #[error(
+        "{}: it is of another robot than the one that was calibrated: axis, kind, parent or child of {} differ\n  help: compare with `calib diff`, apply to the nominal URDF that the profile names, or calibrate with this one",
+        target.display(), joints.iter().map(|j| format!("`{j}`")).collect::<Vec<_>>().join(", ")
+    )]
+    OtherKinematics {
+        /// The target.
+        target: PathBuf,
+        /// The joints.
+        joints: Vec<String>,
+    },
     /// The target was edited since a change that has a record: the first original could not be restored.
     #[error(
         "{}: it was edited after the change that {} records\n  help: undo those edits, or write elsewhere with --out",
@@ -226,6 +237,7 @@ impl ApplyError {
             | Self::ChangedAlready { file, .. } => Some(file),
             Self::YamlUnused { target, .. }
             | Self::PartlyApplied { target, .. }
+            | Self::OtherKinematics { target, .. }
             | Self::OtherOrigins { target, .. } => Some(target),
         }
     }

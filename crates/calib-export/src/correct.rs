@@ -8,7 +8,11 @@ use calib_recording::joint_column;
 
 use crate::error::ExportError;
 use crate::read::Robot;
+use crate::starts::Starts;
 use crate::table::{Csv, NOTES, program};
+
+/// Rows at which it is asked how well the model knows where the tool stands.
+const KNOWN_AT: usize = 200;
 
 /// What is corrected.
 #[derive(Debug, Clone, Default)]
@@ -34,6 +38,8 @@ pub struct Corrected {
     pub reached: usize,
     /// Of them, outside of the fitted range.
     pub outside: usize,
+    /// Of rows without joint positions, those that are reached by another posture than that of the row before.
+    pub elsewhere: usize,
     /// Rows whose tool comes nearer only.
     pub nearer: usize,
     /// Rows that keep their position: refused.
@@ -42,6 +48,11 @@ pub struct Corrected {
     pub before_m: [f64; 2],
     /// After.
     pub after_m: [f64; 2],
+    /// How well the model knows where the tool stands in the root's frame at the commands, by its σ, rms over some of the rows, m; `None` where it states
+    /// no uncertainty.
+    pub known_m: Option<f64>,
+    /// Name of the tool.
+    pub tool: String,
     /// Joints that the table has no column for: they counted as 0.
     pub absent: Vec<String>,
     /// Temperature that was assumed, °C, because the table has none and lengths follow it.
@@ -51,7 +62,7 @@ pub struct Corrected {
 }
 
 /// Corrects a table of joint positions. Where the table has poses of the tool (`<tool>.x_m` …, in the root's frame), the commands
-/// reach those, from the row's joints or, where it has none, from the row before.
+/// reach those, from the row's joints or, where it has none, from the row before, else from postures all over the fitted range.
 ///
 /// # Errors
 /// [`ExportError`].
@@ -68,6 +79,9 @@ pub fn correct(
     let without_joints = program.absent.len() == model.joints().len();
     let (mut work, mut approach) = (model.work(), Approach::new(model));
     let mut out = Corrected::of(&program.absent, wanted.is_some());
+    out.tool.clone_from(options.tool.as_ref().unwrap_or(last));
+    let every = program.q.len().div_ceil(KNOWN_AT);
+    let (mut known, mut starts) = (Vec::new(), None);
     out.assumed_temperature_c = program.assumed_temperature_c(model);
     let mut csv = Csv::default();
     header(&mut csv, robot);
@@ -106,13 +120,46 @@ pub fn correct(
                 model.ik(pose, &seed, tool, &with, &under, out)
             }
         };
-        let done = done.map_err(wrong)?;
+        let mut done = done.map_err(wrong)?;
+        // Who states how far a joint may go wants no other posture.
+        let free = without_joints && options.largest_rad.is_none() && options.largest_m.is_none();
+        if let Some(pose) = target.flatten().filter(|_| free && !is_there(&done)) {
+            let known = match starts.take() {
+                Some(known) => known,
+                None => Starts::of(model, tool, &mut work).map_err(wrong)?,
+            };
+            let with = options.within(Options::inverse());
+            let mut other = command.clone();
+            for start in known.near(pose, with.aim) {
+                let to = (&mut work, &mut other[..]);
+                let tried = model.ik(pose, start, tool, &with, &under, to);
+                let tried = tried.map_err(wrong)?;
+                if is_there(&tried) {
+                    command.copy_from_slice(&other);
+                    done = tried;
+                    out.elsewhere += 1;
+                    break;
+                }
+            }
+            starts = Some(known);
+        }
         out.count(&done);
+        if k % every == 0 && model.has_uncertainty() {
+            let sigma = model.sigma(&command, tool, &under, &mut work);
+            let position = sigma.map_err(wrong)?.fixed_view::<3, 3>(3, 3).trace();
+            known.push(position);
+        }
         line(&mut csv, robot, &command, &done);
     }
+    let mean = known.iter().sum::<f64>() / known.len().max(1) as f64;
+    out.known_m = (!known.is_empty()).then(|| mean.sqrt());
     out.finish();
     out.csv = csv.text();
     Ok(out)
+}
+
+fn is_there(done: &Correction) -> bool {
+    matches!(done.outcome, Outcome::Reached | Outcome::OutOfScope(_))
 }
 
 impl CorrectOptions {
@@ -136,10 +183,13 @@ impl Corrected {
             rows: 0,
             reached: 0,
             outside: 0,
+            elsewhere: 0,
             nearer: 0,
             refused: 0,
             before_m: [0.0; 2],
             after_m: [0.0; 2],
+            known_m: None,
+            tool: String::new(),
             absent: absent.to_vec(),
             assumed_temperature_c: None,
             cartesian,

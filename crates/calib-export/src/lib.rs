@@ -25,6 +25,7 @@ mod opw;
 mod poe;
 mod predict;
 mod read;
+mod starts;
 mod table;
 mod target;
 mod ur;

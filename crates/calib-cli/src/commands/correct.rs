@@ -3,11 +3,12 @@
 use std::path::PathBuf;
 
 use calib_export::{CorrectOptions, Corrected, correct};
+use calib_model::file::RobotModelFile;
 use calib_pipeline::ExitCode;
 use clap::Args;
 
 use super::plugin_options::Evaluated;
-use super::predict::{say_absent, say_assumed, write};
+use super::predict::{say_absent, say_assumed, say_rejected, write};
 use crate::error::CliError;
 use crate::terminal::{Console, say_note};
 
@@ -64,11 +65,32 @@ pub fn run(console: &Console, options: &Correct) -> Result<ExitCode, CliError> {
         }
         say_assumed(console, done.assumed_temperature_c);
         say_note(console, &summary(&done));
+        say_rejected(console, &robot.file);
+        if let Some(note) = known(&done, &robot.file) {
+            say_note(console, &note);
+        }
     }
     write(console, options.out.as_ref(), &done.csv)?;
     Ok(match done.refused {
         0 => ExitCode::Accepted,
         _ => ExitCode::VerdictFail,
+    })
+}
+
+/// What the error of the verdict leaves out: it is of bodies in the tracker's frame, and the program is in that of the root.
+fn known(done: &Corrected, file: &RobotModelFile) -> Option<String> {
+    /// Below twice that error nothing is left out that matters.
+    const MORE: f64 = 2.0;
+    let known = done.known_m?;
+    let stated = file.validity.as_ref()?.position_error_m?;
+    (known > MORE * stated).then(|| {
+        format!(
+            "where `{}` stands in `{}` is known to {:.3} mm rms (σ); the {:.3} mm of the verdict are of the bodies in the tracker's frame. State the `mount` of a body on the root and of one on the last link, or align the program with the cell by the corrected robot",
+            done.tool,
+            file.root,
+            1e3 * known,
+            1e3 * stated
+        )
     })
 }
 
@@ -84,6 +106,10 @@ fn summary(done: &Corrected) -> String {
     );
     for (count, what) in [
         (done.outside, "outside of the fitted range"),
+        (
+            done.elsewhere,
+            "by another posture than the row before: the robot does not get there by a small motion",
+        ),
         (done.nearer, "nearer only"),
         (done.refused, "refused: they keep their position"),
     ] {

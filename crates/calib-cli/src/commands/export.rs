@@ -7,7 +7,7 @@ use calib_pipeline::ExitCode;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
-use super::predict::{say_absent, write};
+use super::predict::{say_absent, say_rejected, write};
 use crate::error::CliError;
 use crate::terminal::{Console, say_note};
 
@@ -47,6 +47,9 @@ pub fn run(console: &Console, options: &Export) -> Result<ExitCode, CliError> {
     };
     let rows = region.as_ref().map(|region| region.postures.as_slice());
     let done = export(&robot, options.to, options.tool.as_deref(), rows)?;
+    if !console.quiet {
+        say_rejected(console, &robot.file);
+    }
     if let Some(region) = region.as_ref().filter(|_| !console.quiet) {
         say_absent(console, &region.absent);
     }

@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use calib_export::{Frame, PredictOptions, predict};
 use calib_files::{OutputFile, folder_of, write_new};
+use calib_model::file::RobotModelFile;
 use calib_pipeline::ExitCode;
 use clap::{Args, ValueEnum};
 use serde_json::json;
@@ -11,6 +12,9 @@ use serde_json::json;
 use super::plugin_options::Evaluated;
 use crate::error::CliError;
 use crate::terminal::{Console, emit, emit_paths, emit_written, say_note};
+
+/// The verdict in a model file that is no pass.
+const REJECTED: &str = "rejected";
 
 /// Arguments of `calib predict`.
 #[derive(Debug, Args)]
@@ -65,6 +69,7 @@ pub fn run(console: &Console, options: &Predict) -> Result<ExitCode, CliError> {
     if !console.quiet {
         say_absent(console, &done.absent);
         say_assumed(console, done.assumed_temperature_c);
+        say_rejected(console, &robot.robot.file);
         for (link, own) in &done.renamed {
             let note = format!(
                 "`{link}` is the link; the body or point of the same name is `{own}`, as in the scene"
@@ -80,6 +85,20 @@ pub fn run(console: &Console, options: &Predict) -> Result<ExitCode, CliError> {
         }
     }
     write(console, options.out.as_ref(), &done.csv)
+}
+
+/// Whether the calibration that a model is of was rejected.
+pub(super) fn say_rejected(console: &Console, file: &RobotModelFile) {
+    let rejected = file
+        .validity
+        .as_ref()
+        .is_some_and(|v| v.verdict == REJECTED);
+    if rejected {
+        say_note(
+            console,
+            "the calibration that this model is of was rejected: its report says why",
+        );
+    }
 }
 
 /// The temperature that the robot was taken to have.

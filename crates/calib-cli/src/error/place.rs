@@ -179,6 +179,7 @@ fn of_apply(error: &ApplyError) -> &'static str {
         ApplyError::NotAccepted { .. } => "not-accepted",
         ApplyError::ChangedAlready { .. } => "changed-already",
         ApplyError::OtherOrigins { .. } => "other-origins",
+        ApplyError::OtherKinematics { .. } => "other-kinematics",
         ApplyError::PartlyApplied { .. } => "partly-applied",
         ApplyError::Stopped { .. } => "apply-stopped",
         ApplyError::NoRecord { .. } | ApplyError::NotARecord { .. } => "no-record",

@@ -234,3 +234,56 @@ fn a_body_with_the_name_of_a_link_is_distinguished() {
     assert!(link.csv != body, "the body is not where the link is");
     assert_eq!(of("upper").renamed, []);
 }
+
+/// Poses of the tool in any order, far from each other: each is reached, whatever the row before it was.
+#[test]
+fn poses_without_joints_are_reached_from_anywhere() {
+    let robot = arm();
+    let model = &robot.model;
+    let folder = tempfile::tempdir().expect("a folder");
+    let tool = model.last_link();
+    let name = &model.links()[tool.index()];
+    let mut text =
+        format!("{name}.x_m,{name}.y_m,{name}.z_m,{name}.qx,{name}.qy,{name}.qz,{name}.qw\n");
+    let mut work = model.work();
+    let rows = 80;
+    for k in 0..rows {
+        let q: Vec<f64> = model
+            .joints()
+            .iter()
+            .enumerate()
+            .map(|(j, joint)| {
+                let [low, high] = joint.fitted_range.or(joint.limits).expect("a range");
+                let part = (0.37 + (k as f64) * [0.618_034, 0.754_878][j % 2]).fract();
+                low + (high - low) * part
+            })
+            .collect();
+        model
+            .forward(&q, &Under::default(), &mut work)
+            .expect("finite");
+        let pose = model
+            .root_from(tool.into(), &work)
+            .expect("a link")
+            .isometry();
+        let (p, r) = (pose.translation.vector, pose.rotation.coords);
+        text += &format!(
+            "{:.12},{:.12},{:.12},{:.12},{:.12},{:.12},{:.12}\n",
+            p.x, p.y, p.z, r.x, r.y, r.z, r.w
+        );
+    }
+    let path = table(&folder, &text);
+    let options = CorrectOptions {
+        tool: Some(name.clone()),
+        ..CorrectOptions::default()
+    };
+    let done = correct(&robot, &path, &options).expect("corrected");
+    assert_eq!((done.rows, done.reached), (rows, rows));
+    assert!(done.elsewhere > 0 && done.after_m[1] < 1e-8, "{done:?}");
+    // Who bounds the motion of a joint wants no other posture.
+    let bounded = CorrectOptions {
+        largest_rad: Some(0.2),
+        ..options
+    };
+    let done = correct(&robot, &path, &bounded).expect("corrected");
+    assert!(done.elsewhere == 0 && done.reached < rows, "{done:?}");
+}
