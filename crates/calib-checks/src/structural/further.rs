@@ -15,7 +15,7 @@ pub(super) fn further(
     data: &Data,
     screened: &[SampleIndex],
     options: &Options,
-    wrong: bool,
+    (wrong, frame): (bool, bool),
 ) -> Vec<Candidate> {
     let suspects = &options.suspects;
     let mut more = of_still(data);
@@ -44,10 +44,15 @@ pub(super) fn further(
     if wrong && suspects.is_empty() {
         more.extend(of_axes(data));
     }
-    if wrong {
+    if wrong || frame {
         let of_zeros = zeros::of_zeros(data, screened, options);
         // One that only the suspects show may be everywhere.
-        let everywhere = |scope: &Scope| *scope == Scope::All || asked(scope);
+        let of_all = |scope: &Scope| *scope == Scope::All;
+        let in_suspects = |r: &RecordingIndex| suspects.is_empty() || suspects.contains(r);
+        let everywhere = |scope: &Scope| match scope {
+            Scope::Recording(r) => in_suspects(r),
+            scope => wrong && (of_all(scope) || asked(scope)),
+        };
         more.extend(
             of_zeros
                 .into_iter()

@@ -67,7 +67,7 @@ impl Asked<'_> {
             Hypothesis::TrackerMoved | Hypothesis::Remounted { .. }
         );
         let nearly = |s: &Scored| match s.scoped.hypothesis {
-            Hypothesis::StoodAt { .. } if is_frame => options.name_ratio,
+            Hypothesis::StoodAt { .. } | Hypothesis::Zero { .. } if is_frame => options.name_ratio,
             _ => options.runner_up_ratio,
         };
         let corrected = apply(&best.scoped, self.data);

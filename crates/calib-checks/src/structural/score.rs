@@ -10,9 +10,11 @@ use super::ids::JointIndex;
 use super::scan::{Scan, Score, Scored};
 use super::special;
 
-/// A frame or a mount of a recording's own takes up nominal errors, and a zero part of whatever is wrong: clean sweeps in recordings of their own gained up to 2.
+/// A frame or a mount of a recording's own takes up nominal errors: clean sweeps in recordings of their own gained up to 2.
 /// Such a hypothesis must gain this many times as much as others, 3 instead of 1.5.
 const OWN_FRAME: f64 = 2.0;
+/// The same of one zero: of two that explain as much, the zero is the simpler one.
+const OWN_ZERO: f64 = 1.7;
 
 /// Every hypothesis in every scope that is allowed for it; beyond `enough`, m, a lower bound of the residual will do.
 pub(crate) fn score(scan: &Scan<'_>, candidates: &[Candidate], enough: f64) -> Vec<Scored> {
@@ -24,12 +26,12 @@ pub(crate) fn score(scan: &Scan<'_>, candidates: &[Candidate], enough: f64) -> V
                 .collect(),
             _ => scan.score(hypothesis, scopes, enough),
         };
-        if matches!(
-            hypothesis,
-            Hypothesis::TrackerMoved | Hypothesis::Remounted { .. } | Hypothesis::Zero { .. }
-        ) {
-            scored.iter_mut().for_each(|s| s.score.score *= OWN_FRAME);
-        }
+        let own = match hypothesis {
+            Hypothesis::TrackerMoved | Hypothesis::Remounted { .. } => OWN_FRAME,
+            Hypothesis::Zero { .. } => OWN_ZERO,
+            _ => 1.0,
+        };
+        scored.iter_mut().for_each(|s| s.score.score *= own);
         scored
     };
     let scored: Vec<Vec<Scored>> = candidates.par_iter().map(of_candidate).collect();

@@ -11,6 +11,7 @@ mod layout;
 mod limits;
 mod merge;
 mod named;
+mod twins;
 mod without;
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -202,7 +203,8 @@ fn decision(layout: &Layout<'_>, outcome: &Outcome) -> Vec<Finding> {
     match &outcome.decision {
         Decision::Named(named) => {
             let of_columns = without::in_place_of(layout, outcome, named);
-            of_columns.map_or_else(|| named::findings(layout, outcome, named), |f| vec![f])
+            let named = twins::likelier_first(layout, named);
+            of_columns.map_or_else(|| named::findings(layout, outcome, &named), |f| vec![f])
         }
         Decision::Undecided { .. } if outcome.jump.is_some() => {
             let found = outcome.jump.iter();

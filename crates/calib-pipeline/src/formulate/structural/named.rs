@@ -69,11 +69,16 @@ pub(super) fn with_evidence(
         }
     }
     let doubtful = named.within_expected == Some(false);
+    // What has unknowns of its own must leave so much less, and is no better where it leaves a little less.
+    let next = named
+        .evidence
+        .next
+        .filter(|next| *next >= named.evidence.best);
     let limit = outcome.expected.filter(|_| doubtful).map(|e| e.limit);
     finding
         .with("none", Fact::meters(named.evidence.none))
         .with("best", Fact::meters(named.evidence.best))
-        .with_some("next", named.evidence.next.map(Fact::meters))
+        .with_some("next", next.map(Fact::meters))
         .with_some("allowed_none", named.allowing.map(|a| Fact::meters(a.none)))
         .with_some("allowed", named.allowing.map(|a| Fact::meters(a.best)))
         .with_some("limit", limit.map(Fact::meters))

@@ -1,0 +1,75 @@
+//! Which of several corrections that the recordings do not distinguish is said first: one that keeps readings within the URDF's limits, and of those a sign
+//! before a zero that is off by half a turn, which is the rarer mistake.
+
+use calib_checks::structural::{Correction, Hypothesis, JointIndex, Named, apply_all};
+
+use super::layout::Layout;
+
+/// Readings at a limit may be beyond it by this, as where a profile is read: rad or m, half a degree.
+const TOLERANCE: f64 = 0.009;
+
+/// The name with the likelier correction first.
+pub(super) fn likelier_first(layout: &Layout<'_>, named: &Named) -> Named {
+    if named.equivalent.is_empty() || !is_of_readings(&named.correction) {
+        return named.clone();
+    }
+    let all: Vec<&Correction> = std::iter::once(&named.correction)
+        .chain(named.equivalent.iter().filter(|c| is_of_readings(c)))
+        .collect();
+    // The first of equals stays the first.
+    let best = all
+        .iter()
+        .min_by_key(|c| (!is_within(layout, c), is_half_turn(c)));
+    let Some(&best) = best.filter(|best| **best != &named.correction) else {
+        return named.clone();
+    };
+    let others = named.equivalent.iter().filter(|c| *c != best);
+    Named {
+        correction: best.clone(),
+        equivalent: std::iter::once(&named.correction)
+            .chain(others)
+            .cloned()
+            .collect(),
+        ..named.clone()
+    }
+}
+
+/// Single corrections of what a joint reads.
+fn is_of_readings(correction: &Correction) -> bool {
+    let [scoped] = &correction[..] else {
+        return false;
+    };
+    matches!(
+        scoped.hypothesis,
+        Hypothesis::Sign { .. } | Hypothesis::Offset { .. } | Hypothesis::Zero { .. }
+    )
+}
+
+fn is_half_turn(correction: &Correction) -> bool {
+    let mut all = correction.iter();
+    all.any(|s| matches!(s.hypothesis, Hypothesis::Offset { .. }))
+}
+
+/// Whether no reading that the correction changes is beyond the limits of its joint.
+fn is_within(layout: &Layout<'_>, correction: &Correction) -> bool {
+    let corrected = apply_all(correction, &layout.data);
+    let model = &layout.inputs.robot.model;
+    let limits: Vec<Option<(f64, f64)>> = model
+        .joint_ids()
+        .map(|id| model.joint(id).limits.range())
+        .collect();
+    let rows = layout.data.readings.iter().zip(&corrected.readings);
+    let beyond = |joint: JointIndex, before: Option<f64>, after: Option<f64>| {
+        let (Some(before), Some(after), Some(Some((low, high)))) =
+            (before, after, limits.get(joint.0))
+        else {
+            return false;
+        };
+        before != after && !(low - TOLERANCE..=high + TOLERANCE).contains(&after)
+    };
+    let mut readings = rows.flat_map(|(before, after)| {
+        let pairs = before.iter().zip(after).enumerate();
+        pairs.map(|(j, (before, after))| (JointIndex(j), *before, *after))
+    });
+    !readings.any(|(joint, before, after)| beyond(joint, before, after))
+}
