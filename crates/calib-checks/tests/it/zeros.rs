@@ -125,3 +125,34 @@ fn a_zero_that_is_off_in_one_recording_is_named_there() {
     assert!(wrong.is_empty(), "{wrong:#?}");
     assert!(right >= 16, "{right}");
 }
+
+/// The last joint's zero and a body that turned about its axis are the same: the zero is named, and the body with it.
+#[test]
+fn the_zero_of_the_last_joint_is_said_beside_its_body() {
+    let (mut right, mut wrong) = (0, Vec::new());
+    for seed in 0..24_u64 {
+        let setting = Setting::new(73_000 + seed, Plan::Poses(40), BodyKind::Markers(4), SMALL);
+        let joints = setting.nominal.joints();
+        let last = joints.len() - 1;
+        if !matches!(joints[last].motion, Motion::Revolute(_)) {
+            continue;
+        }
+        let mut data = setting.data(true);
+        for i in 20..data.readings.len() {
+            data.recording[i] = RecordingIndex(1);
+            data.readings[i][last] = data.readings[i][last].map(|q| q - 0.4);
+        }
+        let Decision::Named(named) = explain(&data, &options()).unwrap().decision else {
+            continue;
+        };
+        let is_body = |c: &Correction| matches!(c[0].hypothesis, Hypothesis::Remounted { .. });
+        let beside = named.equivalent.iter().any(is_body)
+            || named.alternatives.iter().any(|a| is_body(&a.0));
+        match named.correction[0].hypothesis {
+            Hypothesis::Zero { joint, .. } if joint.0 == last && beside => right += 1,
+            _ => wrong.push(format!("{seed} {named:?}")),
+        }
+    }
+    assert!(wrong.is_empty(), "{wrong:#?}");
+    assert!(right >= 8, "{right}");
+}

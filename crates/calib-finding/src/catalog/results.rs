@@ -118,6 +118,12 @@ super::topic! {
             "Joint `{joint}` errs by {amplitude}, {ratio} ± {sigma} times per turn, as a gear train out of center does once per turn of its motor (probability of chance over all joints and ratios: {chance}).",
             "Compare the ratio with the gear's data sheet, then state it, `robot: {gear_ratio: {{joint}: {stated}}}`, and add `motor_eccentricity` to the list `solve: free`.";
     }
+    /// A gain of a sliding joint that the tracker's scale explains as well.
+    GAIN_OR_SCALE = "gain-or-scale" {
+        "": Warning,
+            "Joint `{joint}` moves {excess:percent} ± {sigma:percent} more than its readings say, {moves} over its range. A tracker that reports all lengths as much too long looks the same: only the lengths of the robot distinguish the two.",
+            "Measure a known length with the tracker: a scale bar, or two marks at a known distance, best as long as the range of the joint. Where the tracker is right, keep the gain; otherwise correct its lengths and take `gain` out of what is free.";
+    }
     /// A marker scatters unlike the others of its body.
     MARKER_NOISE = "marker-noise" {
         "": Info,

@@ -16,7 +16,9 @@ use crate::formulate::memory::with_memory;
 use crate::formulate::ml;
 use crate::formulate::realign::realign;
 use crate::formulate::solved::Solved;
-use crate::formulate::{cameras, clock, gear_ratio, noise, priors, row_levels, starts, wanted};
+use crate::formulate::{
+    cameras, clock, gain_or_scale, gear_ratio, noise, priors, row_levels, starts, wanted,
+};
 use crate::prepare::inputs::Inputs;
 use crate::prepare::repeats::merge;
 use crate::prepare::tracks::body_tracks;
@@ -90,6 +92,9 @@ pub fn likelihood(
     if chosen.is_some() {
         checked.findings.extend(gear_ratio::searched(&fit));
     }
+    checked
+        .findings
+        .extend(gain_or_scale::findings(inputs, &fit));
     clock::noticed(&mut checked.findings, inputs, &fit);
     clock::correct(inputs, &fit);
     ml_result(inputs, fit, Some(registered))
