@@ -13,6 +13,7 @@ use crate::fact::{About, AngleHow, LengthHow};
 use crate::header::Header;
 use crate::name::{self, NamedUnit};
 use crate::robot;
+use crate::unread;
 
 /// Largest angle in radians that is no angle in degrees: one turn, and a tenth.
 const TURN: f64 = 2.2 * std::f64::consts::PI;
@@ -53,7 +54,12 @@ pub fn guess(model: &RobotModel, header: &Header) -> Guess {
         (0..header.names.len()).filter(|i| !used.contains(i) && !header.names[*i].is_empty());
     let ignored: Vec<String> = ignored.map(|i| header.names[i].clone()).collect();
     if !ignored.is_empty() {
-        guess.facts.push(About::Ignored { columns: ignored });
+        let time = guess.map.time.is_none();
+        guess.facts.push(About::Ignored {
+            orientation: unread::orientation(header, &ignored),
+            times: time.then(|| unread::times(header, &ignored)).flatten(),
+            columns: ignored,
+        });
     }
     guess
 }
@@ -101,7 +107,14 @@ fn time(header: &Header, guess: &mut Guess, used: &mut BTreeSet<usize>) {
     });
 }
 
-/// Seconds, unless the numbers are those of a clock since 1970 in a smaller unit, or whole numbers many steps apart.
+/// Whether nearly all times are a step apart.
+fn is_even(t: &[f64], step: f64) -> bool {
+    let apart = t.windows(2).map(|pair| pair[1] - pair[0]);
+    let even = apart.filter(|d| (d - step).abs() < 0.3 * step).count();
+    10 * even >= 9 * (t.len() - 1)
+}
+
+/// Seconds, unless the numbers are those of a clock since 1970 in a smaller unit, or steps of many that are whole or equal.
 fn unit_of_time(column: &[Option<f64>]) -> TimeUnit {
     let t: Vec<f64> = column.iter().flatten().copied().collect();
     let last = t.last().copied().unwrap_or(0.0);
@@ -116,6 +129,8 @@ fn unit_of_time(column: &[Option<f64>]) -> TimeUnit {
         x if x > 1e14 => TimeUnit::Us,
         x if x > 1e11 => TimeUnit::Ms,
         _ if whole && (1.0..=200.0).contains(&step) && t.len() > 100 => TimeUnit::Ms,
+        // Nobody takes a hundred poses at equal intervals of five seconds and more.
+        _ if (5.0..=200.0).contains(&step) && t.len() > 100 && is_even(&t, step) => TimeUnit::Ms,
         _ => TimeUnit::S,
     }
 }

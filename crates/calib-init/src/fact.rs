@@ -214,6 +214,10 @@ pub enum About {
     Ignored {
         /// Their names.
         columns: Vec<String>,
+        /// Those that seem to be an orientation.
+        orientation: Vec<String>,
+        /// The one that seems to hold times as text.
+        times: Option<String>,
     },
     /// A marker that repeats another one in every row: left out.
     Duplicate {

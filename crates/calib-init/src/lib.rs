@@ -29,6 +29,7 @@ pub mod skeleton;
 pub mod source;
 pub mod tables;
 pub mod terminal;
+mod unread;
 pub mod words;
 pub mod write;
 mod yaml;

@@ -267,7 +267,25 @@ fn of_columns(about: &About) -> String {
             let how = if *named { "" } else { ", by its numbers" };
             format!("`{column}` is the time in {unit}{how}.")
         }
-        About::Ignored { columns } => format!("Not used: {}.", quoted(columns)),
+        About::Ignored {
+            columns,
+            orientation,
+            times,
+        } => {
+            let mut text = format!("Not used: {}.", quoted(columns));
+            if !orientation.is_empty() {
+                text += &format!(
+                    " {} seem to be an orientation: without it the body is a point. Write it as a quaternion, `<body>.qx` to `<body>.qw`, or map its columns.",
+                    quoted(orientation)
+                );
+            }
+            if let Some(times) = times {
+                text += &format!(
+                    " `{times}` seems to hold times as text: without times every row is a pose at rest. Write them in seconds, as `t_s`."
+                );
+            }
+            text
+        }
         _ => String::new(),
     }
 }

@@ -202,6 +202,12 @@ super::topic! {
             "Most rows with joint `{joint}` between {low} and {high} disagree with the nominal robot: {count} of {rows:row}.",
             "Check what is special about this range of the joint: a stop, a cable, or a wrong reading.";
     }
+    /// Coordinates that nobody measured.
+    NOT_MEASURED = "not-measured" {
+        "": Error,
+            "The recordings fit the nominal robot to {none} rms. No robot is that close to its drawing, and no tracker measures as well: these coordinates were computed from the joint values, by a controller or a simulation, and say nothing of the real robot.",
+            "Record what a tracker measures. The position of the tool that a controller shows or logs is no measurement; leave its columns out.";
+    }
     /// A body that could not be compared with the robot.
     NOT_CHECKED = "not-checked" {
         "": Warning,

@@ -33,6 +33,9 @@ pub(super) fn is_guess(about: &About) -> bool {
         } if !same.is_empty() || next.as_ref().is_some_and(|n| n.rms < CERTAIN * rms) => true,
         About::Rigid { sigma, .. } => sigma.is_some_and(|s| s >= LOOSE),
         About::Time { named, .. } => !named,
+        About::Ignored {
+            orientation, times, ..
+        } => times.is_some() || !orientation.is_empty(),
         About::Log { named, rows, .. } => !named || rows.is_some(),
         About::TipOfChain { .. }
         | About::LinkUnknown { .. }

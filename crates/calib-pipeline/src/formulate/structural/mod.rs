@@ -91,6 +91,7 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
     found.zeros = zeros_of_fit(&layout, &outcome);
     let consistent = matches!(outcome.decision, Decision::Consistent { .. });
     let consistent = consistent || !found.zeros.is_empty();
+    found.findings.extend(not_measured(&layout, &outcome));
     let mut beside = limits::findings(&layout, &outcome, consistent);
     beside.retain(|finding| !without::says(&found.findings, finding));
     found.findings.extend(beside);
@@ -112,6 +113,24 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
         found.findings.extend(errors);
     }
     found
+}
+
+/// A nominal robot that fits to less than any tracker resolves was not measured.
+fn not_measured(layout: &Layout<'_>, outcome: &Outcome) -> Option<Finding> {
+    /// m: three decimals of a millimeter are 0.5 µm.
+    const COMPUTED: f64 = 3e-6;
+    /// Rows that leave a residual.
+    const ROWS: usize = 6;
+    let consistent = matches!(outcome.decision, Decision::Consistent { .. });
+    let moves = !outcome.design.moving.is_empty() && outcome.rows >= ROWS;
+    (consistent && moves && outcome.rms < COMPUTED).then(|| {
+        let recordings = layout.recordings.iter().map(|r| r.name.clone()).collect();
+        let subject = Subject {
+            recordings,
+            ..Subject::default()
+        };
+        Finding::new(catalog::NOT_MEASURED, subject).with("none", Fact::meters(outcome.rms))
+    })
 }
 
 /// The corrections that are named, where all of them are zeros that the fit estimates.
