@@ -271,6 +271,18 @@ fn a_fleet_is_calibrated_and_compared_with_last_time() {
     let refused = dir.calib_with(&[&batch[..], &from].concat()).expect(3);
     let said = "now/r002/checks.csv: the shard with robot `r002` was made from another version of this file";
     assert!(refused.stderr.contains(said), "{}", refused.stderr);
+    // Its shard is made again, the other is kept, and both belong together.
+    let mut merge = vec!["merge", "--out", "again.parquet"];
+    let shards = ["1/2", "2/2"].map(|shard| {
+        let ran = dir.calib_with(&[&batch[..], &["divided-2", "--shard", shard]].concat());
+        ran.expect(0).stdout.trim().to_owned()
+    });
+    merge.extend(shards.iter().map(String::as_str));
+    dir.calib_with(&merge).expect(0);
+    let from = ["divided-2", "--from", "again.parquet"];
+    dir.calib_with(&[&batch[..], &from].concat()).expect(0);
+    let row = dir.json("divided-2/fleet.json");
+    assert_eq!(row["robots"], 6, "{row:#}");
 }
 
 /// Robots that were calibrated on machines without a common disk: the bytes of the batch on one.

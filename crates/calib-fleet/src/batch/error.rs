@@ -61,7 +61,7 @@ pub enum BatchError {
     },
     /// A shard was made from a file that is another one now.
     #[error(
-        "{}: the shard with robot `{robot}` was made from another version of this file\n  help: make that shard again with `--shard I/N --restart`, and merge again",
+        "{}: the shard with robot `{robot}` was made from another version of this file\n  help: make that shard again with `--shard I/N`, and merge again",
         path.display()
     )]
     Changed {

@@ -35,7 +35,7 @@ use calib_files::ResultsFolder;
 
 use crate::error::FleetError;
 use crate::shard::{Identity, Shard};
-use crate::shard_file::{Finished, file_name, write_shard};
+use crate::shard_file::{Finished, ShardFile, file_name, write_shard};
 use crate::store::Store;
 use crate::work::{Kept, results};
 
@@ -43,6 +43,18 @@ use crate::work::{Kept, results};
 const ROBOTS: &str = "robots";
 /// The work in names of files and footers.
 const KIND: &str = "batch";
+
+/// Whether a shard of this work that is there was made from other files than those of the robots now. One of another work is refused, one that cannot be
+/// read where it is merged.
+fn changed(path: &Path, identity: &Identity, members: &[Member]) -> bool {
+    let file = ShardFile::open(path).ok();
+    let Some(file) = file.filter(|file| file.identity == *identity) else {
+        return false;
+    };
+    let rows = file.filter_map(|unit| serde_json::from_str::<Robot>(&unit.ok()?.result).ok());
+    let mut all = rows.zip(members);
+    all.any(|(robot, member)| one::changed(member, &robot).is_some())
+}
 
 /// A batch.
 pub struct Batch<'a> {
@@ -138,12 +150,13 @@ impl Batch<'_> {
             identity: &identity,
             store,
         };
-        if kept.is_there(!self.how.restart)? {
-            return Ok(path);
-        }
         let range = shard.range(identity.units);
         let place = |unit: u64| usize::try_from(unit).unwrap_or(usize::MAX);
         let members = &self.members[place(range.start)..place(range.end)];
+        let again = self.how.restart || changed(&path, &identity, members);
+        if kept.is_there(!again)? {
+            return Ok(path);
+        }
         self.calibrate(members, progress)?;
         let units = range.zip(members).map(|(unit, member)| {
             let row = self.row(member).map_err(|error| match error {
