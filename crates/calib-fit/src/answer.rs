@@ -34,6 +34,15 @@ pub(crate) fn doubt(reason: Option<&str>) -> String {
     reason.map_or_else(String::new, |why| format!("  weak: {why}\n"))
 }
 
+/// Rows that were left out as copies of others.
+pub(crate) fn copied(copies: usize) -> String {
+    match copies {
+        0 => String::new(),
+        1 => "  1 row repeats an earlier one to the last digit: it counts once\n".to_owned(),
+        n => format!("  {n} rows repeat earlier ones to the last digit: each counts once\n"),
+    }
+}
+
 /// How far the intervals of 95 % reach: σ times Student's quantile, which few degrees of freedom widen.
 pub(crate) fn freedom(degrees_of_freedom: Option<f64>) -> String {
     match degrees_of_freedom {

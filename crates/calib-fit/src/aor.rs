@@ -7,7 +7,7 @@ use calib_estimator::Kind;
 use serde_json::json;
 
 use crate::TableRequest;
-use crate::answer::{Answer, answer, contradicted, coordinates, doubt, freedom, matrix};
+use crate::answer::{Answer, answer, contradicted, coordinates, copied, doubt, freedom, matrix};
 use crate::comparison::{Found, Quantity};
 use crate::error::FitError;
 use crate::explained::{Judged, Unexplained, unexplained};
@@ -89,7 +89,7 @@ fn aor_answer(request: &TableRequest, table: &Table, id: &str, e: &AorEstimate) 
     let observable = judged.is_observable();
     let rejected = rejected(table, e);
     let frame = axis_frame(request);
-    let value = json!({
+    let mut value = json!({
         "estimator": id,
         "observable": observable,
         "verdict": judged.verdict.as_str(),
@@ -112,6 +112,10 @@ fn aor_answer(request: &TableRequest, table: &Table, id: &str, e: &AorEstimate) 
     text += &doubt(e.reason.as_deref());
     let _ = writeln!(text, "  sigma {:.4} deg", e.sigma_direction.to_degrees());
     text += &freedom(e.degrees_of_freedom);
+    text += &copied(table.copies);
+    if table.copies > 0 {
+        value["copies"] = json!(table.copies);
+    }
     text += &contradicted(e.contradicts.as_ref());
     let _ = writeln!(
         text,

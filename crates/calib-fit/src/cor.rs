@@ -7,7 +7,7 @@ use calib_estimator::Kind;
 use serde_json::json;
 
 use crate::TableRequest;
-use crate::answer::{Answer, answer, contradicted, coordinates, doubt, freedom, matrix};
+use crate::answer::{Answer, answer, contradicted, coordinates, copied, doubt, freedom, matrix};
 use crate::comparison::{Found, Quantity};
 use crate::error::FitError;
 use crate::explained::{Judged, Unexplained, unexplained};
@@ -120,6 +120,10 @@ fn cor_answer(request: &TableRequest, table: &Table, id: &str, e: &CorEstimate) 
         sigma.x, sigma.y, sigma.z
     );
     text += &freedom(e.degrees_of_freedom);
+    text += &copied(table.copies);
+    if table.copies > 0 {
+        value["copies"] = json!(table.copies);
+    }
     text += &contradicted(e.noise.contradicts.as_ref());
     match &e.shape {
         Shape::Radii { radii, .. } => {

@@ -1,5 +1,6 @@
 //! `calib fit handeye`.
 
+use std::collections::BTreeSet;
 use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write as _;
 
@@ -11,7 +12,7 @@ use nalgebra::{Isometry3, Translation3, Vector3};
 use serde_json::{Value, json};
 
 use crate::HandEyeRequest;
-use crate::answer::{Answer, answer, doubt, freedom, matrix, pose_text, pose_value};
+use crate::answer::{Answer, answer, copied, doubt, freedom, matrix, pose_text, pose_value};
 use crate::comparison::{Found, Quantity};
 use crate::error::FitError;
 use crate::measured::Measured;
@@ -48,6 +49,7 @@ pub fn handeye(request: &HandEyeRequest) -> Result<Answer, FitError> {
         rows,
         robot,
         measured,
+        copies,
     } = pose_pairs(table, &request.robot, &request.measured)?;
     let written = measured;
     let measured: Vec<Isometry3<f64>> = match request.inverted {
@@ -82,7 +84,7 @@ pub fn handeye(request: &HandEyeRequest) -> Result<Answer, FitError> {
                 true => explained_as_written(e, &robot, &written),
                 false => e.clone(),
             };
-            handeye_answer(request, id, e, &rows)
+            handeye_answer(request, id, e, (&rows, copies))
         },
     )
 }
@@ -92,6 +94,8 @@ struct PosePairs {
     rows: Vec<u64>,
     robot: Vec<Isometry3<f64>>,
     measured: Vec<Isometry3<f64>>,
+    /// Rows that repeat an earlier one to the last digit, which are left out.
+    copies: usize,
 }
 
 /// The rows in which both poses are known.
@@ -137,9 +141,22 @@ fn pose_pairs(table: &Measured, robot: &str, measured: &str) -> Result<PosePairs
         rows: Vec::new(),
         robot: Vec::new(),
         measured: Vec::new(),
+        copies: 0,
     };
+    let mut seen = BTreeSet::new();
     for ((a, b), row) in both.zip(&poses.rows) {
         if let (Some(a), Some(b)) = (a, b) {
+            let bits = [a, b].map(|pose| {
+                let (t, r) = (pose.translation.vector, pose.rotation.coords);
+                t.iter()
+                    .chain(r.iter())
+                    .map(|x| x.to_bits())
+                    .collect::<Vec<u64>>()
+            });
+            if !seen.insert(bits) {
+                pairs.copies += 1;
+                continue;
+            }
             pairs.rows.push(*row);
             pairs.robot.push(*a);
             pairs.measured.push(*b);
@@ -149,11 +166,16 @@ fn pose_pairs(table: &Measured, robot: &str, measured: &str) -> Result<PosePairs
 }
 
 /// `rows`: of the poses, in the file.
-fn handeye_answer(request: &HandEyeRequest, id: &str, e: &HandEye, rows: &[u64]) -> Answer {
+fn handeye_answer(
+    request: &HandEyeRequest,
+    id: &str,
+    e: &HandEye,
+    (rows, copies): (&[u64], usize),
+) -> Answer {
     let rejected: Vec<u64> = e.rejected.iter().map(|&k| rows[k]).collect();
     let observable = e.verdict == Verdict::Ok;
     let camera = (request.optical && observable).then(|| e.x * link_from_optical().inverse());
-    let value = json!({
+    let mut value = json!({
         "estimator": id,
         "observable": observable,
         "verdict": e.verdict.as_str(),
@@ -212,6 +234,10 @@ fn handeye_answer(request: &HandEyeRequest, id: &str, e: &HandEye, rows: &[u64])
         );
     }
     text += &freedom(e.noise.degrees_of_freedom);
+    text += &copied(copies);
+    if copies > 0 {
+        value["copies"] = json!(copies);
+    }
     let _ = writeln!(
         text,
         "  rms {:.4} mm, {:.4} deg\n  certificate: {} (gap at most {:.1e})",

@@ -130,6 +130,30 @@ mod tests {
         assert_eq!(value["used"], 39);
     }
 
+    /// A table that was written twice says no more than once.
+    #[test]
+    fn copies_of_rows_count_once() {
+        let once = held(Vec::new());
+        let mut twice = once.clone();
+        twice.poses.rows = (0..80).collect();
+        let track = twice.poses.markers.get_mut("tip").expect("a marker");
+        let again = track.clone();
+        track.extend(again);
+        let fit = |held: Held| {
+            let answer = crate::cor(&crate::TableRequest {
+                file: Some(held.into()),
+                ..crate::TableRequest::default()
+            });
+            answer.expect("an answer")
+        };
+        let (once, twice) = (fit(once), fit(twice));
+        let note = "  39 rows repeat earlier ones to the last digit: each counts once\n";
+        assert!(twice.text.contains(note), "{}", twice.text);
+        assert_eq!(twice.text.replace(note, ""), once.text);
+        let value: serde_json::Value = serde_json::from_str(&twice.json).expect("JSON");
+        assert_eq!((&value["used"], &value["copies"]), (&39.into(), &39.into()));
+    }
+
     #[test]
     fn weights_that_do_not_fit_are_refused_with_the_row() {
         let said = |weights: Vec<f64>| fit(weights).expect_err("refused").to_string();

@@ -1,5 +1,6 @@
 //! The measurements of one table, in whichever forms it can give.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use calib_checks::rigid_body::{Template, body_poses, rigid_groups};
@@ -31,6 +32,8 @@ pub(crate) struct Table {
     pub weights: Vec<f64>,
     /// Joint angle of every row, rad; empty where no joint was named.
     pub angles: Vec<f64>,
+    /// Rows that repeated an earlier one to the last digit: a copy is no measurement, and they are left out.
+    pub copies: usize,
 }
 
 impl Table {
@@ -39,6 +42,11 @@ impl Table {
         let file = measured.name();
         let mut poses = measured.poses(&ReadOptions::default())?;
         let mut weights = measured.weights(request.weights.as_deref(), poses.rows.len())?;
+        // Covariances and weights are of the lines as they stand.
+        let copies = match request.covariances.is_none() && weights.is_empty() {
+            true => leave_out_copies(&mut poses),
+            false => 0,
+        };
         let angles = match &request.joint {
             Some(joint) => keep_rows_with(file, &mut poses, &mut weights, joint)?,
             None => Vec::new(),
@@ -114,6 +122,7 @@ impl Table {
             covariances,
             weights,
             angles,
+            copies,
         })
     }
 
@@ -137,6 +146,46 @@ impl Table {
     }
 }
 
+/// Leaves out rows in which all markers and bodies are where they were in an earlier one, to the last digit; how many there were.
+fn leave_out_copies(poses: &mut Poses) -> usize {
+    let rows = poses.rows.len();
+    let mut seen = BTreeSet::new();
+    let new: Vec<bool> = (0..rows)
+        .map(|i| {
+            let markers = poses
+                .markers
+                .values()
+                .map(|t| t[i].map(|p| bits(&p.coords)));
+            let bodies = poses.bodies.values().map(|t| {
+                let both =
+                    |p: Isometry3<f64>| (bits(&p.translation.vector), bits(&p.rotation.coords));
+                t[i].map(both)
+            });
+            let row = (markers.collect::<Vec<_>>(), bodies.collect::<Vec<_>>());
+            let lost = row.0.iter().all(Option::is_none) && row.1.iter().all(Option::is_none);
+            lost || seen.insert(row)
+        })
+        .collect();
+    let copies = new.iter().filter(|new| !**new).count();
+    if copies > 0 {
+        keep(&mut poses.rows, &new);
+        poses.markers.values_mut().for_each(|t| keep(t, &new));
+        poses.bodies.values_mut().for_each(|t| keep(t, &new));
+        poses.joints.values_mut().for_each(|t| keep(t, &new));
+    }
+    copies
+}
+
+fn bits<'a>(numbers: impl IntoIterator<Item = &'a f64>) -> Vec<u64> {
+    numbers.into_iter().map(|x| x.to_bits()).collect()
+}
+
+/// The elements of the rows that are kept.
+fn keep<T>(track: &mut Vec<T>, rows: &[bool]) {
+    let mut rows = rows.iter();
+    track.retain(|_| rows.next().is_some_and(|kept| *kept));
+}
+
 /// The rows in which a joint's angle is known, and the angles, rad.
 fn keep_rows_with(
     file: &Path,
@@ -151,17 +200,14 @@ fn keep_rows_with(
             it_has(poses.joints.keys()),
         )
     })?;
-    fn keep<T: Clone>(track: &mut Vec<T>, column: &[Option<f64>]) {
-        let mut known = column.iter();
-        track.retain(|_| known.next().is_some_and(Option::is_some));
-    }
-    keep(&mut poses.rows, &column);
-    keep(weights, &column);
+    let known: Vec<bool> = column.iter().map(Option::is_some).collect();
+    keep(&mut poses.rows, &known);
+    keep(weights, &known);
     for track in poses.markers.values_mut() {
-        keep(track, &column);
+        keep(track, &known);
     }
     for track in poses.bodies.values_mut() {
-        keep(track, &column);
+        keep(track, &known);
     }
     Ok(column.into_iter().flatten().collect())
 }
