@@ -91,7 +91,9 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
     found.zeros = zeros_of_fit(&layout, &outcome);
     let consistent = matches!(outcome.decision, Decision::Consistent { .. });
     let consistent = consistent || !found.zeros.is_empty();
-    found.findings.extend(not_measured(&layout, &outcome));
+    found
+        .findings
+        .extend(not_measured(&layout, &outcome, options.sigma));
     let mut beside = limits::findings(&layout, &outcome, consistent);
     beside.retain(|finding| !without::says(&found.findings, finding));
     found.findings.extend(beside);
@@ -115,15 +117,18 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
     found
 }
 
-/// A nominal robot that fits to less than any tracker resolves was not measured.
-fn not_measured(layout: &Layout<'_>, outcome: &Outcome) -> Option<Finding> {
+/// A nominal robot that fits to less than any tracker resolves, and far less than the stated noise `sigma`, m, was not measured.
+fn not_measured(layout: &Layout<'_>, outcome: &Outcome, sigma: f64) -> Option<Finding> {
     /// m: three decimals of a millimeter are 0.5 µm.
     const COMPUTED: f64 = 3e-6;
+    /// Part of the noise: of as many coordinates as there are, none scatters so little by chance.
+    const BELOW: f64 = 0.1;
     /// Rows that leave a residual.
     const ROWS: usize = 6;
     let consistent = matches!(outcome.decision, Decision::Consistent { .. });
     let moves = !outcome.design.moving.is_empty() && outcome.rows >= ROWS;
-    (consistent && moves && outcome.rms < COMPUTED).then(|| {
+    let limit = COMPUTED.min(BELOW * sigma);
+    (consistent && moves && outcome.rms < limit).then(|| {
         let recordings = layout.recordings.iter().map(|r| r.name.clone()).collect();
         let subject = Subject {
             recordings,
