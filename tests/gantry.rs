@@ -218,6 +218,31 @@ fn a_gantry_that_is_in_order_has_no_share() {
     }
 }
 
+/// A gain of one slide is what a wrong scale of the tracker looks like, unless another slide has none.
+#[test]
+fn a_gain_that_is_a_scale_as_well_is_said() {
+    let gain = Share {
+        of: 0,
+        with: 0,
+        factor: 0.004,
+    };
+    let said = |free: &str| -> Option<Value> {
+        let dir = gantry(Some(gain), 31).edit("gantry.yaml", "solve:\n", free);
+        let report = run(&dir);
+        let found = warnings(&report);
+        let one = found.into_iter().find(|f| f["id"] == "gain-or-scale");
+        one.cloned()
+    };
+    let alone = said("solve:\n  joints: {gx: {free: [offset, axis, gain]}}\n");
+    let alone = alone.expect("a finding");
+    assert_eq!(alone["facts"]["joint"], "gx", "{alone:#}");
+    let excess = alone["facts"]["excess"]["value"].as_f64();
+    assert!((excess.expect("a ratio") - 0.004).abs() < 5e-4, "{alone:#}");
+    let each = ["gx", "gy", "gz"].map(|joint| format!("{joint}: {{free: [offset, axis, gain]}}"));
+    let all = format!("solve:\n  joints: {{{}}}\n", each.join(", "));
+    assert_eq!(said(&all), None);
+}
+
 /// A share between joints of two kinds has a unit; it is no percentage.
 #[test]
 fn a_large_share_between_unlike_joints_is_said_in_its_unit() {
