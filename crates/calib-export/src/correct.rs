@@ -81,7 +81,7 @@ pub fn correct(
     let mut out = Corrected::of(&program.absent, wanted.is_some());
     out.tool.clone_from(options.tool.as_ref().unwrap_or(last));
     let every = program.q.len().div_ceil(KNOWN_AT);
-    let (mut known, mut starts) = (Vec::new(), None);
+    let (mut variances, mut starts) = (Vec::new(), None);
     out.assumed_temperature_c = program.assumed_temperature_c(model);
     let mut csv = Csv::default();
     header(&mut csv, robot);
@@ -147,12 +147,12 @@ pub fn correct(
         if k % every == 0 && model.has_uncertainty() {
             let sigma = model.sigma(&command, tool, &under, &mut work);
             let position = sigma.map_err(wrong)?.fixed_view::<3, 3>(3, 3).trace();
-            known.push(position);
+            variances.push(position);
         }
         line(&mut csv, robot, &command, &done);
     }
-    let mean = known.iter().sum::<f64>() / known.len().max(1) as f64;
-    out.known_m = (!known.is_empty()).then(|| mean.sqrt());
+    let mean = variances.iter().sum::<f64>() / variances.len().max(1) as f64;
+    out.known_m = (!variances.is_empty()).then(|| mean.sqrt());
     out.finish();
     out.csv = csv.text();
     Ok(out)

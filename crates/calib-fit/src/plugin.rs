@@ -9,7 +9,7 @@ use calib_plugin::{
 };
 use serde_json::{Value, json};
 
-use crate::answer::{Answer, answer, coordinates, doubt};
+use crate::answer::{Answer, answer, coordinates, copied, doubt};
 use crate::error::FitError;
 use crate::table::Table;
 use crate::{TableRequest, usage};
@@ -226,6 +226,7 @@ fn center(table: &Table, entry: &Entry<dyn calib_plugin::Cor>, fit: &CorFit) -> 
         None => text += "  sigma  not stated by the plugin\n",
     }
     text += &tail(entry, fit.rms_m, fit.used, fit.rejected.len());
+    text += &copied(table.copies);
     answer(text, &value, fit.weak.is_none())
 }
 
@@ -257,5 +258,6 @@ fn axis(table: &Table, entry: &Entry<dyn calib_plugin::Aor>, fit: &AorFit) -> An
         None => text += "  sigma  not stated by the plugin\n",
     }
     text += &tail(entry, fit.rms_m, fit.used, fit.rejected.len());
+    text += &copied(table.copies);
     answer(text, &value, fit.weak.is_none())
 }

@@ -131,15 +131,9 @@ fn decided(asked: &Asked<'_>, outcome: &mut Outcome) -> Correction {
     outcome.expected = expected(data, screened, options);
     let wrong = outcome.expected.is_some_and(|e| ranking.none.rms > e.limit);
     // A frame of its own explains what one zero may explain as well.
-    let leader = ranking.scored.first();
-    let is_frame = |s: &Scored| {
-        matches!(
-            s.scoped.hypothesis,
-            Hypothesis::TrackerMoved | Hypothesis::Remounted { .. }
-        )
-    };
-    let frame = leader.is_some_and(|s| is_frame(s) && ranking.ratio(s.score.score) > 1.0);
-    let more = further(data, screened, options, (wrong, frame));
+    let leads = |s: &Scored| s.scoped.hypothesis.is_frame() && ranking.ratio(s.score.score) > 1.0;
+    let frame = ranking.scored.first().is_some_and(leads);
+    let more = further(data, screened, options, wrong, frame);
     let mut of_more = Ranking::of(data, &more, screened);
     if !wrong {
         // A place that is off by a few degrees is an error that the fit finds.

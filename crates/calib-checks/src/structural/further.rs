@@ -10,12 +10,13 @@ use super::special;
 use super::zeros;
 
 /// Joints that never moved, since no other data say where they stood, in all recordings or in one that is unlike the others; where something is `wrong`,
-/// in any, and axes of the model.
+/// in any, axes of the model, and zeros; zeros of single recordings also where the tracker or a body seems to have moved (`frame`).
 pub(super) fn further(
     data: &Data,
     screened: &[SampleIndex],
     options: &Options,
-    (wrong, frame): (bool, bool),
+    wrong: bool,
+    frame: bool,
 ) -> Vec<Candidate> {
     let suspects = &options.suspects;
     let mut more = of_still(data);
@@ -46,18 +47,14 @@ pub(super) fn further(
     }
     if wrong || frame {
         let of_zeros = zeros::of_zeros(data, screened, options);
-        // One that only the suspects show may be everywhere.
-        let of_all = |scope: &Scope| *scope == Scope::All;
-        let in_suspects = |r: &RecordingIndex| suspects.is_empty() || suspects.contains(r);
-        let everywhere = |scope: &Scope| match scope {
-            Scope::Recording(r) => in_suspects(r),
-            scope => wrong && (of_all(scope) || asked(scope)),
+        let asked = |scope: &Scope| match scope {
+            // One that only the suspects show may be everywhere.
+            Scope::All => wrong,
+            Scope::Recording(r) => suspects.is_empty() || suspects.contains(r),
+            Scope::AllExcept(_) => wrong && suspects.is_empty(),
         };
-        more.extend(
-            of_zeros
-                .into_iter()
-                .filter(|(_, scopes)| scopes.iter().all(everywhere)),
-        );
+        let of_zeros = of_zeros.into_iter();
+        more.extend(of_zeros.filter(|(_, scopes)| scopes.iter().all(asked)));
     }
     more
 }

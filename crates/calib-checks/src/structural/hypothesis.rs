@@ -388,6 +388,11 @@ impl Hypothesis {
         })
     }
 
+    /// A frame or a mount of a recording's own.
+    pub(crate) fn is_frame(&self) -> bool {
+        matches!(self, Self::TrackerMoved | Self::Remounted { .. })
+    }
+
     /// ln of the factor by which measured coordinates are multiplied.
     #[must_use]
     pub fn log_scale(&self) -> f64 {

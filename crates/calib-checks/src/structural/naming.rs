@@ -62,10 +62,7 @@ impl Asked<'_> {
         };
         let times = |s: &Scored| ratio(s.score.score, best.score.score);
         // A frame of its own takes up errors of the robot, which one place of a joint does not.
-        let is_frame = matches!(
-            best.scoped.hypothesis,
-            Hypothesis::TrackerMoved | Hypothesis::Remounted { .. }
-        );
+        let is_frame = best.scoped.hypothesis.is_frame();
         let nearly = |s: &Scored| match s.scoped.hypothesis {
             Hypothesis::StoodAt { .. } | Hypothesis::Zero { .. } if is_frame => options.name_ratio,
             _ => options.runner_up_ratio,

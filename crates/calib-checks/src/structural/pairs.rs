@@ -27,7 +27,7 @@ pub(super) fn name_pair(asked: &Asked<'_>) -> Option<Named> {
     let mut pairs: Vec<Pair> = Vec::new();
     for leader in distinct(&ranking.scored, options.beam) {
         let first = apply(&leader.scoped, data);
-        // Beside one zero that is off, another is another one.
+        // Where one zero is corrected, the others are estimated again.
         let again = match leader.scoped.hypothesis {
             Hypothesis::Zero { .. } => Some(zeros::again(candidates, &first, screened, options)),
             _ => None,

@@ -27,7 +27,7 @@ pub(crate) fn score(scan: &Scan<'_>, candidates: &[Candidate], enough: f64) -> V
             _ => scan.score(hypothesis, scopes, enough),
         };
         let own = match hypothesis {
-            Hypothesis::TrackerMoved | Hypothesis::Remounted { .. } => OWN_FRAME,
+            h if h.is_frame() => OWN_FRAME,
             Hypothesis::Zero { .. } => OWN_ZERO,
             _ => 1.0,
         };

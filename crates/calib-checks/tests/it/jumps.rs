@@ -49,12 +49,7 @@ fn a_jump_is_named_with_its_row() {
     let mut counts = Counts::default();
     for seed in 0..96_u64 {
         let mut rng = ChaCha8Rng::seed_from_u64(61_000 + seed);
-        let body = [
-            BodyKind::Markers(1),
-            BodyKind::Markers(2),
-            BodyKind::Markers(4),
-            BodyKind::Pose,
-        ][(seed % 4) as usize];
+        let body = BODIES[(seed % 4) as usize];
         let poses = [20, 40][(seed / 4) as usize % 2];
         let errors = [SMALL, BIG][(seed / 8) as usize % 2];
         let setting = Setting::new(61_000 + seed, Plan::Poses(poses), body, errors);

@@ -35,6 +35,14 @@ pub enum BodyKind {
     Pose,
 }
 
+/// Bodies of a study over designs.
+pub const BODIES: [BodyKind; 4] = [
+    BodyKind::Markers(1),
+    BodyKind::Markers(2),
+    BodyKind::Markers(4),
+    BodyKind::Pose,
+];
+
 /// Errors of the nominal robot: angle offset (°), origin (mm), tilt (°).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Errors(pub f64, pub f64, pub f64);

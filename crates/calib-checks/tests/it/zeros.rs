@@ -27,12 +27,7 @@ fn a_zero_that_is_off_is_named_with_its_size() {
     let mut counts = Counts::default();
     for seed in 0..96_u64 {
         let mut rng = ChaCha8Rng::seed_from_u64(71_000 + seed);
-        let body = [
-            BodyKind::Markers(1),
-            BodyKind::Markers(2),
-            BodyKind::Markers(4),
-            BodyKind::Pose,
-        ][(seed % 4) as usize];
+        let body = BODIES[(seed % 4) as usize];
         let plan = [Plan::Poses(20), Plan::Poses(40)][(seed / 4) as usize % 2];
         let errors = [SMALL, BIG][(seed / 8) as usize % 2];
         let setting = Setting::new(71_000 + seed, plan, body, errors);
@@ -78,6 +73,7 @@ fn a_zero_that_is_off_is_named_with_its_size() {
             other => counts.wrong.push(format!("{} {other:?}", about())),
         }
     }
+    println!("{counts:?}");
     assert!(counts.wrong.is_empty(), "{counts:#?}");
     assert!(counts.right >= 34 && counts.undecided <= 3, "{counts:?}");
 }

@@ -85,7 +85,7 @@ fn known(done: &Corrected, file: &RobotModelFile) -> Option<String> {
     let stated = file.validity.as_ref()?.position_error_m?;
     (known > MORE * stated).then(|| {
         format!(
-            "where `{}` stands in `{}` is known to {:.3} mm rms (σ); the {:.3} mm of the verdict are of the bodies in the tracker's frame. State the `mount` of a body on the root and of one on the last link, or align the program with the cell by the corrected robot",
+            "where `{}` stands in `{}` is known to {:.3} mm rms (σ); the {:.3} mm of the verdict are of the bodies in the tracker's frame. State the `mount` of a body on the root and of one on the last link, or measure points of the cell with the corrected robot and place the program on them",
             done.tool,
             file.root,
             1e3 * known,

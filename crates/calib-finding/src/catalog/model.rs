@@ -205,7 +205,7 @@ super::topic! {
     /// Coordinates that nobody measured.
     NOT_MEASURED = "not-measured" {
         "": Error,
-            "The recordings fit the nominal robot to {none} rms. No robot is that close to its drawing, and no tracker measures as well: these coordinates were computed from the joint values, by a controller or a simulation, and say nothing of the real robot.",
+            "The recordings fit the nominal robot to {none} rms. No robot is that close to its drawing, and no tracker is that precise: these coordinates were computed from the joint values, by a controller or a simulation, and say nothing of the real robot.",
             "Record what a tracker measures. The position of the tool that a controller shows or logs is no measurement; leave its columns out.";
     }
     /// A body that could not be compared with the robot.

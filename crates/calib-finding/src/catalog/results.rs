@@ -121,7 +121,7 @@ super::topic! {
     /// A gain of a sliding joint that the tracker's scale explains as well.
     GAIN_OR_SCALE = "gain-or-scale" {
         "": Warning,
-            "Joint `{joint}` moves {excess:percent} ± {sigma:percent} more than its readings say, {moves} over its range. A tracker that reports all lengths as much too long looks the same: only the lengths of the robot distinguish the two.",
+            "Joint `{joint}` moves {excess:percent} ± {sigma:percent} more than its readings say, {moves} over its range. A tracker whose lengths are too long by the same ratio gives the same data (negative: less, and too short): only the lengths of the robot distinguish the two.",
             "Measure a known length with the tracker: a scale bar, or two marks at a known distance, best as long as the range of the joint. Where the tracker is right, keep the gain; otherwise correct its lengths and take `gain` out of what is free.";
     }
     /// A marker scatters unlike the others of its body.

@@ -25,6 +25,9 @@ struct Gain {
 /// Gains that the tracker's scale would explain as well, where no length is known to the tracker: at most one finding, of the clearest.
 pub(crate) fn findings(inputs: &Inputs, fit: &MlFit) -> Option<Finding> {
     let bodies = inputs.robot.profile.bodies.values();
+    if bodies.len() == 0 {
+        return None;
+    }
     let mut stated = bodies.filter_map(|body| match &body.kind {
         BodyKind::Markers { template, .. } => template.as_ref(),
         _ => None,

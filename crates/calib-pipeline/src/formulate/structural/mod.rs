@@ -87,6 +87,7 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
     let Ok(outcome) = explain(&layout.data, &options) else {
         return found;
     };
+    let outcome = twins::likelier_first(&layout, outcome);
     found.findings.extend(decision(&layout, &outcome));
     found.zeros = zeros_of_fit(&layout, &outcome);
     let consistent = matches!(outcome.decision, Decision::Consistent { .. });
@@ -182,6 +183,7 @@ fn of_validation(
     let Ok(outcome) = explain(&all.data, &options) else {
         return (Vec::new(), Vec::new());
     };
+    let outcome = twins::likelier_first(all, outcome);
     // A large residual alone was judged by the fitted recordings.
     let zeros = zeros_of_fit(all, &outcome);
     let mut findings = decision(all, &outcome);
@@ -227,8 +229,7 @@ fn decision(layout: &Layout<'_>, outcome: &Outcome) -> Vec<Finding> {
     match &outcome.decision {
         Decision::Named(named) => {
             let of_columns = without::in_place_of(layout, outcome, named);
-            let named = twins::likelier_first(layout, named);
-            of_columns.map_or_else(|| named::findings(layout, outcome, &named), |f| vec![f])
+            of_columns.map_or_else(|| named::findings(layout, outcome, named), |f| vec![f])
         }
         Decision::Undecided { .. } if outcome.jump.is_some() => {
             let found = outcome.jump.iter();

@@ -9,7 +9,7 @@ use calib_finding::{About, Fact, Finding, Id, Subject, catalog};
 use super::codes;
 use super::layout::Layout;
 
-/// A fit finds a zero that is off by up to this, rad: beyond 75° some do not converge.
+/// A fit finds a zero that is off by up to this, rad: of simulated arms all converged from 60°, some not from 75°.
 pub(super) const FAR: f64 = std::f64::consts::FRAC_PI_4;
 
 /// The findings of a named correction.

@@ -1,37 +1,31 @@
 //! Which of several corrections that the recordings do not distinguish is said first: one that keeps readings within the URDF's limits, and of those a sign
-//! before a zero that is off by half a turn, which is the rarer mistake.
+//! before a zero that is off by a quarter or half turn, which is the rarer mistake.
 
-use calib_checks::structural::{Correction, Hypothesis, JointIndex, Named, apply_all};
+use calib_checks::structural::{Correction, Decision, Hypothesis, JointIndex, Outcome, apply_all};
 
 use super::layout::Layout;
 
 /// Readings at a limit may be beyond it by this, as where a profile is read: rad or m, half a degree.
 const TOLERANCE: f64 = 0.009;
 
-/// The name with the likelier correction first.
-pub(super) fn likelier_first(layout: &Layout<'_>, named: &Named) -> Named {
-    if named.equivalent.is_empty() || !is_of_readings(&named.correction) {
-        return named.clone();
-    }
-    let all: Vec<&Correction> = std::iter::once(&named.correction)
-        .chain(named.equivalent.iter().filter(|c| is_of_readings(c)))
-        .collect();
-    // The first of equals stays the first.
-    let best = all
-        .iter()
-        .min_by_key(|c| (!is_within(layout, c), is_half_turn(c)));
-    let Some(&best) = best.filter(|best| **best != &named.correction) else {
-        return named.clone();
+/// The outcome with the likelier correction of a name first.
+pub(super) fn likelier_first(layout: &Layout<'_>, mut outcome: Outcome) -> Outcome {
+    let Decision::Named(named) = &mut outcome.decision else {
+        return outcome;
     };
-    let others = named.equivalent.iter().filter(|c| *c != best);
-    Named {
-        correction: best.clone(),
-        equivalent: std::iter::once(&named.correction)
-            .chain(others)
-            .cloned()
-            .collect(),
-        ..named.clone()
+    if !is_of_readings(&named.correction) {
+        return outcome;
     }
+    // The first of equals stays the first.
+    let all = std::iter::once(&named.correction).chain(&named.equivalent);
+    let best = all
+        .enumerate()
+        .filter(|(_, c)| is_of_readings(c))
+        .min_by_key(|(_, c)| (!is_within(layout, c), is_turned(c)));
+    if let Some((place, _)) = best.filter(|(place, _)| *place > 0) {
+        std::mem::swap(&mut named.correction, &mut named.equivalent[place - 1]);
+    }
+    outcome
 }
 
 /// Single corrections of what a joint reads.
@@ -45,7 +39,7 @@ fn is_of_readings(correction: &Correction) -> bool {
     )
 }
 
-fn is_half_turn(correction: &Correction) -> bool {
+fn is_turned(correction: &Correction) -> bool {
     let mut all = correction.iter();
     all.any(|s| matches!(s.hypothesis, Hypothesis::Offset { .. }))
 }
