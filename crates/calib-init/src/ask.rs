@@ -381,10 +381,9 @@ fn of_signs(scene: &Scene<'_>, assigned: &Assigned) -> Option<(Signs, f64)> {
             ..
         }
         | Decision::Named(named) => {
-            // Where no mistake explains the data, a zero takes up part of any.
-            let is_zero = |s: &Scoped| matches!(s.hypothesis, Hypothesis::Zero { .. });
-            let of_zeros = named.correction.iter().all(is_zero);
-            let of_signs = of_zeros || signs::is_of_signs(&named.correction);
+            // Where no mistake explains the data, a zero or a gain takes up part of any.
+            let of_sizes = named.correction.iter().all(|s| s.hypothesis.is_sized());
+            let of_signs = of_sizes || signs::is_of_signs(&named.correction);
             (named.evidence.best, of_signs)
         }
         _ => return None,

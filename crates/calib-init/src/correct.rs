@@ -57,6 +57,10 @@ pub fn mistake(
             value: offset,
             turns: model.joints()[j.0].kind.turns(),
         },
+        Hypothesis::Gain { joint: j, factor } => Mistake::Gain {
+            joint: joint(j),
+            factor,
+        },
         Hypothesis::RowShift { rows } => Mistake::Rows { rows },
         Hypothesis::Mirrored => Mistake::Mirrored,
         Hypothesis::TrackerMoved | Hypothesis::TrackerAxes { .. } => Mistake::TrackerMoved,

@@ -53,6 +53,13 @@ pub enum Mistake {
     Mirrored,
     /// The tracker moved before some recordings.
     TrackerMoved,
+    /// A joint moves a multiple of what its column says.
+    Gain {
+        /// The joint.
+        joint: String,
+        /// What the column must be multiplied by.
+        factor: f64,
+    },
     /// The body moved on its link before some recordings.
     Remounted {
         /// The body.

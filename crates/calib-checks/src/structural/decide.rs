@@ -185,7 +185,7 @@ fn beyond_hypotheses(
             }
         }
         Decision::Named(named)
-            if named.evidence.ratio < options.pair_ratio || is_of_zeros(named) =>
+            if named.evidence.ratio < options.pair_ratio || is_of_sizes(named) =>
         {
             let ratio = named.evidence.ratio;
             let most = clearly_below(named.evidence.best, outcome, options);
@@ -220,10 +220,9 @@ fn beyond_hypotheses(
     }
 }
 
-/// A zero takes up much of a change at one row.
-fn is_of_zeros(named: &Named) -> bool {
-    let is_zero = |s: &Scoped| matches!(s.hypothesis, Hypothesis::Zero { .. });
-    named.correction.iter().any(is_zero)
+/// A zero, a gain or a share takes up much of a change at one row.
+fn is_of_sizes(named: &Named) -> bool {
+    named.correction.iter().any(|s| s.hypothesis.is_sized())
 }
 
 /// What a change at one row may leave beside another explanation, m: less than that by the ratio that names a hypothesis, and than

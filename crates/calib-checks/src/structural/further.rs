@@ -6,11 +6,11 @@ use super::hypothesis::{Hypothesis, Scope};
 use super::ids::{RecordingIndex, SampleIndex};
 use super::outcome::Options;
 use super::scan::Scan;
+use super::sized;
 use super::special;
-use super::zeros;
 
 /// Joints that never moved, since no other data say where they stood, in all recordings or in one that is unlike the others; where something is `wrong`,
-/// in any, axes of the model, and zeros; zeros of single recordings also where the tracker or a body seems to have moved (`frame`).
+/// in any, axes of the model, zeros, gains and couplings; those of single recordings also where the tracker or a body seems to have moved (`frame`).
 pub(super) fn further(
     data: &Data,
     screened: &[SampleIndex],
@@ -46,15 +46,15 @@ pub(super) fn further(
         more.extend(of_axes(data));
     }
     if wrong || frame {
-        let of_zeros = zeros::of_zeros(data, screened, options);
+        let of_sizes = sized::of_sizes(data, screened, options);
         let asked = |scope: &Scope| match scope {
             // One that only the suspects show may be everywhere.
             Scope::All => wrong,
             Scope::Recording(r) => suspects.is_empty() || suspects.contains(r),
             Scope::AllExcept(_) => wrong && suspects.is_empty(),
         };
-        let of_zeros = of_zeros.into_iter();
-        more.extend(of_zeros.filter(|(_, scopes)| scopes.iter().all(asked)));
+        let of_sizes = of_sizes.into_iter();
+        more.extend(of_sizes.filter(|(_, scopes)| scopes.iter().all(asked)));
     }
     more
 }

@@ -393,6 +393,14 @@ impl Hypothesis {
         matches!(self, Self::TrackerMoved | Self::Remounted { .. })
     }
 
+    /// A mistake of one joint by any amount.
+    #[must_use]
+    pub fn is_sized(&self) -> bool {
+        let part = |factor: f64| factor.abs() != 1.0;
+        matches!(self, Self::Zero { .. } | Self::Gain { .. })
+            || matches!(self, Self::Coupling { factor, .. } if part(*factor))
+    }
+
     /// ln of the factor by which measured coordinates are multiplied.
     #[must_use]
     pub fn log_scale(&self) -> f64 {

@@ -135,6 +135,7 @@ pub(super) fn has_unknowns(hypothesis: &Hypothesis) -> bool {
             | Hypothesis::MissingColumn { .. }
             | Hypothesis::StoodAt { .. }
             | Hypothesis::Zero { .. }
+            | Hypothesis::Gain { .. }
             | Hypothesis::TrackerUnit { .. }
     )
 }

@@ -80,13 +80,13 @@ mod rows;
 mod scan;
 mod score;
 mod screen;
+mod sized;
 mod special;
 mod swept;
 mod tested;
 mod thinning;
 mod twin;
 mod whitened;
-mod zeros;
 
 pub use apply::{apply, apply_all};
 pub use chain::{Chain, ChainError, ChainJoint, Motion};

@@ -64,7 +64,8 @@ impl Asked<'_> {
         // A frame of its own takes up errors of the robot, which one place of a joint does not.
         let is_frame = best.scoped.hypothesis.is_frame();
         let nearly = |s: &Scored| match s.scoped.hypothesis {
-            Hypothesis::StoodAt { .. } | Hypothesis::Zero { .. } if is_frame => options.name_ratio,
+            Hypothesis::StoodAt { .. } if is_frame => options.name_ratio,
+            h if is_frame && h.is_sized() => options.name_ratio,
             _ => options.runner_up_ratio,
         };
         let corrected = apply(&best.scoped, self.data);

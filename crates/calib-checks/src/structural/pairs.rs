@@ -6,8 +6,8 @@ use super::naming::{Asked, EQUIVALENT_WITHIN};
 use super::outcome::{Correction, Evidence, Named};
 use super::ranking::{Ranking, distinct, few_samples, ratio};
 use super::scan::{Scan, Score};
+use super::sized;
 use super::twin::twin;
-use super::zeros;
 
 /// Two corrections, with the residual after both.
 struct Pair {
@@ -27,11 +27,9 @@ pub(super) fn name_pair(asked: &Asked<'_>) -> Option<Named> {
     let mut pairs: Vec<Pair> = Vec::new();
     for leader in distinct(&ranking.scored, options.beam) {
         let first = apply(&leader.scoped, data);
-        // Where one zero is corrected, the others are estimated again.
-        let again = match leader.scoped.hypothesis {
-            Hypothesis::Zero { .. } => Some(zeros::again(candidates, &first, screened, options)),
-            _ => None,
-        };
+        // Where one size is corrected, the others are estimated again.
+        let again = (leader.scoped.hypothesis.is_sized())
+            .then(|| sized::again(candidates, &first, screened, options));
         let candidates = again.as_deref().unwrap_or(candidates);
         // Densities multiply: the second score is relative to the data after the first correction.
         let scale = leader.score.score / leader.score.rms.max(f64::MIN_POSITIVE);

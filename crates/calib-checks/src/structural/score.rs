@@ -13,8 +13,8 @@ use super::special;
 /// A frame or a mount of a recording's own takes up nominal errors: clean sweeps in recordings of their own gained up to 2.
 /// Such a hypothesis must gain this many times as much as others, 3 instead of 1.5.
 const OWN_FRAME: f64 = 2.0;
-/// The same of one zero: of two that explain as much, the zero is the simpler one.
-const OWN_ZERO: f64 = 1.7;
+/// The same of a mistake of one joint by any amount: of two that explain as much, it is the simpler one.
+const OWN_SIZE: f64 = 1.7;
 
 /// Every hypothesis in every scope that is allowed for it; beyond `enough`, m, a lower bound of the residual will do.
 pub(crate) fn score(scan: &Scan<'_>, candidates: &[Candidate], enough: f64) -> Vec<Scored> {
@@ -28,7 +28,7 @@ pub(crate) fn score(scan: &Scan<'_>, candidates: &[Candidate], enough: f64) -> V
         };
         let own = match hypothesis {
             h if h.is_frame() => OWN_FRAME,
-            Hypothesis::Zero { .. } => OWN_ZERO,
+            h if h.is_sized() => OWN_SIZE,
             _ => 1.0,
         };
         scored.iter_mut().for_each(|s| s.score.score *= own);

@@ -7,6 +7,7 @@ mod likelihood;
 mod real_tables;
 mod recall;
 mod robots;
+mod sizes;
 mod structural;
 mod sync;
 mod templates;

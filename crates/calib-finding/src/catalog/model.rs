@@ -57,6 +57,9 @@ super::topic! {
         "": Warning,
             "Joint `{joint}` seems to move {excess:percent} (± {sigma:percent}) more than its readings say; this changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
             "Check the joint's transmission ratio. To estimate it, add `gain` to what is free of this joint in `solve: {joints: …}`.";
+        "multiple": Error,
+            "The recordings fit the nominal robot to {none} rms, but to {best} if joint `{joint}` moves {factor} times as far as its column says[[ in {recordings:code}]][[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
+            "Look for the ratio near {factor} that explains it: of the gear, of the counts per turn, of the unit of this column. Correct it in the controller, or multiply the column by it. The number here is estimated with the nominal robot, to a few percent.";
     }
     /// A joint of a body's chain without readings.
     JOINT_COLUMN_MISSING = "joint-column-missing" {

@@ -74,6 +74,9 @@ fn found(mistake: &Mistake) -> String {
             let value = number::plain(*value, unit);
             format!("The zero of `{joint}` is off: {value} must be added.")
         }
+        Mistake::Gain { joint, factor } => {
+            format!("Joint `{joint}` moves {factor:.3} times what its column says.")
+        }
         Mistake::Rows { rows } => format!(
             "Joint values and tracker rows are paired {} off.",
             plural(rows.unsigned_abs().into(), "row", "rows")

@@ -59,6 +59,7 @@ fn of_joints(id: Id) -> bool {
         catalog::JOINT_AXIS,
         catalog::JOINT_ORDER,
         catalog::JOINT_OFFSET,
+        catalog::JOINT_GAIN,
         catalog::JOINT_COUPLING,
         catalog::JOINT_COLUMN_MISSING,
         catalog::UNIT_MISMATCH,

@@ -140,6 +140,16 @@ fn zero(layout: &Layout<'_>, scope: Scope, joint: JointIndex, offset: f64) -> Fi
         .with_some("recordings", some.map(Fact::names))
 }
 
+/// A joint moves a multiple of what its column says.
+fn gain(layout: &Layout<'_>, scope: Scope, joint: JointIndex, factor: f64) -> Finding {
+    let some = (scope != Scope::All).then(|| layout.recordings_in(scope));
+    let name = layout.joint(joint);
+    Finding::of_kind(catalog::JOINT_GAIN, "multiple", Subject::joint(name))
+        .with("joint", Fact::name(name))
+        .with("factor", Fact::ratio(factor))
+        .with_some("recordings", some.map(Fact::names))
+}
+
 /// Id, subject and values of one hypothesis.
 fn of_hypothesis(layout: &Layout<'_>, outcome: &Outcome, scoped: &Scoped) -> Finding {
     let of_joint = |id: Id, joint: JointIndex| {
@@ -180,6 +190,7 @@ fn of_hypothesis(layout: &Layout<'_>, outcome: &Outcome, scoped: &Scoped) -> Fin
         .with("joint", Fact::name(layout.joint(joint)))
         .with("offset", Fact::radians(turns.angle())),
         Hypothesis::Zero { joint, offset } => zero(layout, scoped.scope, joint, offset),
+        Hypothesis::Gain { joint, factor } => gain(layout, scoped.scope, joint, factor),
         Hypothesis::Coupling {
             joint,
             source,

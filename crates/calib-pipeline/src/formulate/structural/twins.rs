@@ -1,7 +1,9 @@
 //! Which of several corrections that the recordings do not distinguish is said first: one that keeps readings within the URDF's limits, and of those a sign
-//! before a zero that is off by a quarter or half turn, which is the rarer mistake.
+//! before a zero that is off by a quarter or half turn, and a gain last: the rarer mistakes.
 
-use calib_checks::structural::{Correction, Decision, Hypothesis, JointIndex, Outcome, apply_all};
+use calib_checks::structural::{
+    Correction, Decision, Hypothesis, JointIndex, Outcome, Scoped, apply_all,
+};
 
 use super::layout::Layout;
 
@@ -21,7 +23,7 @@ pub(super) fn likelier_first(layout: &Layout<'_>, mut outcome: Outcome) -> Outco
     let best = all
         .enumerate()
         .filter(|(_, c)| is_of_readings(c))
-        .min_by_key(|(_, c)| (!is_within(layout, c), is_turned(c)));
+        .min_by_key(|(_, c)| (!is_within(layout, c), rarity(c)));
     if let Some((place, _)) = best.filter(|(place, _)| *place > 0) {
         std::mem::swap(&mut named.correction, &mut named.equivalent[place - 1]);
     }
@@ -35,13 +37,21 @@ fn is_of_readings(correction: &Correction) -> bool {
     };
     matches!(
         scoped.hypothesis,
-        Hypothesis::Sign { .. } | Hypothesis::Offset { .. } | Hypothesis::Zero { .. }
+        Hypothesis::Sign { .. }
+            | Hypothesis::Offset { .. }
+            | Hypothesis::Zero { .. }
+            | Hypothesis::Gain { .. }
     )
 }
 
-fn is_turned(correction: &Correction) -> bool {
-    let mut all = correction.iter();
-    all.any(|s| matches!(s.hypothesis, Hypothesis::Offset { .. }))
+/// Larger for the rarer mistakes.
+fn rarity(correction: &Correction) -> usize {
+    let rarity = |scoped: &Scoped| match scoped.hypothesis {
+        Hypothesis::Offset { .. } => 1,
+        Hypothesis::Gain { .. } => 2,
+        _ => 0,
+    };
+    correction.iter().map(rarity).max().unwrap_or(0)
 }
 
 /// Whether no reading that the correction changes is beyond the limits of its joint.
