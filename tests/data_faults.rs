@@ -380,7 +380,7 @@ fn exchanged(dir: Scratch, a: &str, b: &str) -> Scratch {
     })
 }
 
-const MISTAKES: [Mistake; 6] = [
+const MISTAKES: [Mistake; 8] = [
     ("sign of wrist_pitch", "joint-sign", |dir| {
         column(dir, "wrist_pitch_deg", |q| -q)
     }),
@@ -404,6 +404,12 @@ const MISTAKES: [Mistake; 6] = [
             .fold(dir, |dir, joint| {
                 column(dir, &format!("{joint}_deg"), f64::to_radians)
             })
+    }),
+    ("half the counts of elbow", "joint-gain", |dir| {
+        column(dir, "elbow_deg", |q| 2.0 * q)
+    }),
+    ("another gear of shoulder", "joint-gain", |dir| {
+        column(dir, "shoulder_deg", |q| 0.7 * q)
     }),
 ];
 
