@@ -54,7 +54,7 @@ super::topic! {
     }
     /// A joint moves more or less than its readings.
     JOINT_GAIN = "joint-gain" {
-        "": Warning,
+        "excess": Warning,
             "Joint `{joint}` seems to move {excess:percent} (± {sigma:percent}) more than its readings say; this changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
             "Check the joint's transmission ratio. To estimate it, add `gain` to what is free of this joint in `solve: {joints: …}`.";
         "multiple": Error,

@@ -119,7 +119,7 @@ fn continuous_finding(layout: &Layout<'_>, found: &Continuous) -> Option<Finding
     let finding = match found.hypothesis {
         Hypothesis::Gain { joint, factor } => {
             let name = layout.joint(joint);
-            Finding::new(catalog::JOINT_GAIN, Subject::joint(name))
+            Finding::of_kind(catalog::JOINT_GAIN, "excess", Subject::joint(name))
                 .with("joint", Fact::name(name))
                 .with("excess", Fact::ratio(factor - 1.0))
         }
