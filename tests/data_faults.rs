@@ -413,6 +413,33 @@ const MISTAKES: [Mistake; 8] = [
     }),
 ];
 
+/// A gain that the fit estimates does not stop a run: the fit finds it, and the held-out poses decide.
+#[test]
+fn a_gain_that_the_fit_estimates_is_a_warning() {
+    let dir = column(ripley(), "elbow_deg", |q| 2.0 * q);
+    let held = findings(&dir, PROFILE);
+    assert!(
+        held.iter().any(|f| f["facts"]["kind"] == "multiple_held"),
+        "{held:#?}"
+    );
+    let free = dir.read(PROFILE).replace(
+        "joint_offsets, joint_axes]",
+        "joint_offsets, joint_axes, joint_gains]",
+    );
+    let dir = dir.file(PROFILE, free);
+    let found = findings(&dir, PROFILE);
+    let gain = found
+        .iter()
+        .find(|f| f["id"] == "joint-gain")
+        .expect("named");
+    assert_eq!(
+        (&gain["severity"], &gain["facts"]["kind"]),
+        (&"warning".into(), &"multiple".into())
+    );
+    let run = dir.calib(["run", PROFILE, "--out", "out"]);
+    assert_eq!(run.code, 0, "{}{}", run.stdout, run.stderr);
+}
+
 /// Ripley with recordings of another robot of its kind.
 fn drawn(seed: u64) -> Scratch {
     let dir = ripley();

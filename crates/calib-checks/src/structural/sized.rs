@@ -117,12 +117,18 @@ pub(super) fn of_sizes(data: &Data, screened: &[SampleIndex], options: &Options)
         .iter()
         .flat_map(|joint| [(Kind::Zero, *joint), (Kind::Gain, *joint)])
         .flat_map(|(kind, joint)| scopes.iter().map(move |scope| (kind, joint, *scope)));
-    let pairs = moving.iter().flat_map(|joint| {
-        let alike = move |s: &&JointIndex| {
-            *s != joint && data.chain.turns(s.0) == data.chain.turns(joint.0)
-        };
-        let sources = moving.iter().filter(alike);
-        sources.map(|source| (Kind::Share { source: *source }, *joint, Scope::All))
+    let limbs: Vec<Vec<JointIndex>> = (data.bodies.iter())
+        .map(|body| data.chain.readings_of(body.link))
+        .collect();
+    // Belts and parallel links are within a limb.
+    let alike = &|joint: JointIndex, source: JointIndex| {
+        let mut limbs = limbs.iter();
+        let one = limbs.any(|limb| limb.contains(&joint) && limb.contains(&source));
+        one && joint != source && data.chain.turns(source.0) == data.chain.turns(joint.0)
+    };
+    let pairs = moving.iter().flat_map(|&joint| {
+        let sources = moving.iter().filter(move |s| alike(joint, **s));
+        sources.map(move |source| (Kind::Share { source: *source }, joint, Scope::All))
     });
     let tells = |(kind, joint, scope): &(Kind, JointIndex, Scope)| {
         // Of a joint that stands, any gain is a place.

@@ -150,12 +150,14 @@ fn row_findings(rows: &Rows<'_>) -> Vec<Finding> {
     .collect()
 }
 
-/// Joint positions with the zeros and the couplings that the fit estimates.
+/// Joint positions with the zeros, gains and couplings that the fit estimates.
 fn corrected(q: &[f64], structural: &Structural) -> Vec<f64> {
     let mut read = q.to_vec();
-    for scoped in &structural.zeros {
-        if let Hypothesis::Zero { joint, offset } = scoped.hypothesis {
-            read[joint.0] += offset;
+    for scoped in &structural.of_fit {
+        match scoped.hypothesis {
+            Hypothesis::Zero { joint, offset } => read[joint.0] += offset,
+            Hypothesis::Gain { joint, factor } => read[joint.0] *= factor,
+            _ => {}
         }
     }
     let mut moved = read.clone();
@@ -206,7 +208,7 @@ fn deviating<'a>(
     let chain = coupled(chain, &structural.couplings);
     let validation = |of: &Spoilt<'_>| of.loaded.spec.usage == Usage::Validation;
     let layout = Layout::new(inputs, tracks, &chain, all.iter().any(validation));
-    let Ok(found) = deviations(&apply_all(&structural.zeros, &layout.data)) else {
+    let Ok(found) = deviations(&apply_all(&structural.of_fit, &layout.data)) else {
         return Vec::new();
     };
     // (recording, row, body) → deviation

@@ -148,13 +148,23 @@ impl<'a> Layout<'a> {
     /// Whether the fit estimates the zero of a joint that the recordings move.
     #[must_use]
     pub fn frees_zero(&self, joint: JointIndex) -> bool {
+        self.frees(joint, "offset")
+    }
+
+    /// Whether it estimates the gain.
+    #[must_use]
+    pub fn frees_gain(&self, joint: JointIndex) -> bool {
+        self.frees(joint, "gain")
+    }
+
+    fn frees(&self, joint: JointIndex, effect: &str) -> bool {
         let model = &self.inputs.robot.model;
         let Some(id) = model.joint_ids().nth(joint.0) else {
             return false;
         };
         let slides = !model.joint(id).kind.turns();
         let own = self.inputs.robot.profile.solve.free_set(id, true, slides);
-        own.effects.iter().any(|free| free.effect.id == "offset")
+        own.effects.iter().any(|free| free.effect.id == effect)
     }
 
     /// Unit of a joint's share in the motion of another: none between two that turn or two that slide.

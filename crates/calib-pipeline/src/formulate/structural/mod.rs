@@ -46,8 +46,8 @@ pub struct Structural {
     pub rows_count: bool,
     /// Couplings that the profile declares.
     pub couplings: Vec<Coupling>,
-    /// Zeros that are off, where that is all that is wrong and the fit estimates them.
-    pub zeros: Correction,
+    /// Zeros and gains that are off, where that is all that is wrong and the fit estimates them.
+    pub of_fit: Correction,
 }
 
 /// The nominal robot with the couplings that the profile declares; `None` where its joints are no tree.
@@ -73,7 +73,7 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
         findings: Vec::new(),
         rows_count: true,
         couplings,
-        zeros: Vec::new(),
+        of_fit: Vec::new(),
     };
     let mut options = Options::default();
     if let Some(sigma) = inputs.robot.profile.tracker.marker_sigma {
@@ -89,9 +89,9 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
     };
     let outcome = twins::likelier_first(&layout, outcome);
     found.findings.extend(decision(&layout, &outcome));
-    found.zeros = zeros_of_fit(&layout, &outcome);
+    found.of_fit = left_to_the_fit(&layout, &outcome);
     let consistent = matches!(outcome.decision, Decision::Consistent { .. });
-    let consistent = consistent || !found.zeros.is_empty();
+    let consistent = consistent || !found.of_fit.is_empty();
     found
         .findings
         .extend(not_measured(&layout, &outcome, options.sigma));
@@ -102,9 +102,9 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
     found.rows_count = consistent || too_few;
     if found.rows_count {
         let mut all = Layout::new(inputs, tracks, &chain, true);
-        all.data = apply_all(&found.zeros, &all.data);
-        let (errors, zeros) = of_validation(&all, &outcome, options);
-        found.zeros.extend(zeros);
+        all.data = apply_all(&found.of_fit, &all.data);
+        let (errors, of_fit) = of_validation(&all, &outcome, options);
+        found.of_fit.extend(of_fit);
         // A change at one row looks like a gain in the rows around it.
         if errors
             .iter()
@@ -139,23 +139,29 @@ fn not_measured(layout: &Layout<'_>, outcome: &Outcome, sigma: f64) -> Option<Fi
     })
 }
 
-/// The corrections that are named, where all of them are zeros that the fit estimates.
-fn zeros_of_fit(layout: &Layout<'_>, outcome: &Outcome) -> Correction {
-    let is_zero = |scoped: &Scoped| match scoped.hypothesis {
+/// The corrections that are named, where all of them are zeros and gains that the fit estimates.
+fn left_to_the_fit(layout: &Layout<'_>, outcome: &Outcome) -> Correction {
+    let estimated = |scoped: &Scoped| match scoped.hypothesis {
         Hypothesis::Zero { joint, offset } => {
             let slides = layout.data.chain.turns(joint.0) == Some(false);
             let near = slides || offset.abs() <= named::FAR;
             scoped.scope == Scope::All && near && layout.frees_zero(joint)
         }
+        Hypothesis::Gain { joint, factor } => {
+            let near = named::FITTED_GAINS.contains(&factor);
+            scoped.scope == Scope::All && near && layout.frees_gain(joint)
+        }
         _ => false,
     };
     match &outcome.decision {
-        Decision::Named(named) if named.correction.iter().all(is_zero) => named.correction.clone(),
+        Decision::Named(named) if named.correction.iter().all(estimated) => {
+            named.correction.clone()
+        }
         _ => Vec::new(),
     }
 }
 
-/// What is wrong in the recordings of the validation alone, where they raise the residual of the fitted ones, and zeros that only they show.
+/// What is wrong in the recordings of the validation alone, where they raise the residual of the fitted ones, and what the fit estimates that only they show.
 fn of_validation(
     all: &Layout<'_>,
     fitted: &Outcome,
@@ -185,10 +191,10 @@ fn of_validation(
     };
     let outcome = twins::likelier_first(all, outcome);
     // A large residual alone was judged by the fitted recordings.
-    let zeros = zeros_of_fit(all, &outcome);
+    let of_fit = left_to_the_fit(all, &outcome);
     let mut findings = decision(all, &outcome);
-    findings.retain(|f| f.severity == Severity::Error || !zeros.is_empty());
-    (findings, zeros)
+    findings.retain(|f| f.severity == Severity::Error || !of_fit.is_empty());
+    (findings, of_fit)
 }
 
 /// The joint whose readings are wrong.
