@@ -152,7 +152,8 @@ fn degrees_of_freedom(info: &DataInformation, report: &Report) -> f64 {
     const NOTHING: f64 = 0.5;
     let of_level = |noise: &calib_report::Noise| {
         let error = noise.relative_error?;
-        let counts = error > 0.0 && (noise.kind != NoiseKind::Joint || error < NOTHING);
+        let of_joints = matches!(noise.kind, NoiseKind::Joint | NoiseKind::Slide);
+        let counts = error > 0.0 && (!of_joints || error < NOTHING);
         // σ̂ of ν degrees has the relative error 1 / √(2ν).
         counts.then(|| 0.5 / error.powi(2))
     };

@@ -178,7 +178,11 @@ fn evaluation(relative_error: Option<f64>) -> Evaluation {
 
 /// Noise of a joint's position; its sensitivity is the lever to the body.
 fn joints(report: &Report, contribution_m: f64) -> BudgetRow {
-    let levels: Vec<(&Noise, f64)> = levels(report, NoiseKind::Joint).collect();
+    // Of joints that turn and joints that slide there is no common level.
+    let slides = levels(report, NoiseKind::Slide).next().is_some();
+    let levels: Vec<(&Noise, f64)> = levels(report, NoiseKind::Joint)
+        .filter(|_| !slides)
+        .collect();
     let squares: f64 = levels.iter().map(|(_, sigma)| sigma * sigma).sum();
     let (u, unit) = match levels.is_empty() {
         true => (contribution_m, Unit::Meter),

@@ -165,8 +165,10 @@ pub enum NoiseKind {
     Position,
     /// An orientation or direction that the tracker measures.
     Orientation,
-    /// A joint position that the robot reports.
+    /// The position of a joint that turns, as the robot reports it.
     Joint,
+    /// That of a joint that slides.
+    Slide,
     /// A factor on stated covariances.
     Scale,
 }
@@ -179,8 +181,10 @@ pub enum NoiseModel {
     /// Nothing: the weights of plain least squares.
     #[default]
     White,
-    /// The joint positions, with one level.
+    /// The positions of the joints that turn, with one level.
     Joint,
+    /// With one more level for the joints that slide.
+    JointAndSlide,
     /// The pose of each body with markers.
     BodyPose,
     /// The joint positions, with a level for each joint.

@@ -13,7 +13,7 @@
 //! (1) decides which weights may be used. Equal weights trust no model of the robot, and neither does the pose of each body;
 //! the joints' noise trusts the robot's Jacobian. Where it predicts worse than the better of the other two, or is larger than
 //! joints scatter, it has swallowed physics, however likely it is. Among those that may be used and lie within two
-//! standard errors of the least (2), one level for all joints is taken, else the smallest: equal weights where the poses do not show
+//! standard errors of the least (2), one level for all joints is taken (one more for those that slide), else the smallest: equal weights where the poses do not show
 //! how the joints scatter stated intervals that held in 92.8 % instead of 95 %. Where equal weights, or those of each body, are taken
 //! all the same, the covariance is that of their estimate under the joints' noise that was found ([`sandwich`](crate::analysis::sandwich)).
 //!
@@ -116,9 +116,9 @@ const CHANCE: f64 = 1e-3;
 const SETTLED: f64 = 0.05;
 /// Statements that trust no model of the robot.
 const SAFE: [NoiseModel; 2] = [NoiseModel::White, NoiseModel::BodyPose];
-/// Statements that a level per joint must predict as well as.
-const SMALLER: [NoiseModel; 3] = [NoiseModel::White, NoiseModel::BodyPose, NoiseModel::Joint];
-/// No joint that is measured at rest scatters by more than this, rad: 1 mm at a meter. Backlash and compliance do, but not at
+/// Statements that trust the model of the robot: one level for all joints that turn, one more for all that slide.
+const JOINTS: [NoiseModel; 2] = [NoiseModel::Joint, NoiseModel::JointAndSlide];
+/// No joint that is measured at rest scatters by more than this, rad or m: 1 mm at a meter. Backlash and compliance do, but not at
 /// random, and weights that take them for noise predict other postures worse than left-out poses show.
 const JOINT_NOISE: f64 = 1e-3;
 /// Steps of scoring of a candidate at most.
@@ -329,10 +329,7 @@ impl Trial {
 
     /// Its joint noise can be noise of joints.
     fn is_of_joints(&self) -> bool {
-        let mut joints = self
-            .levels()
-            .into_iter()
-            .filter(|l| l.kind == NoiseKind::Joint);
+        let mut joints = self.levels().into_iter().filter(|l| l.kind.is_of_joints());
         joints.all(|l| l.sigma <= JOINT_NOISE)
     }
 
@@ -463,11 +460,12 @@ fn choose(trials: &[Trial]) -> Option<NoiseChoice> {
                 admitted: match trials[i].noise {
                     NoiseModel::White => true,
                     NoiseModel::BodyPose => rms[i] <= SAME * rms[white],
-                    NoiseModel::Joint => {
+                    NoiseModel::Joint | NoiseModel::JointAndSlide => {
                         rms[i] <= SAME * least_of(&SAFE) && trials[i].is_of_joints()
                     }
                     NoiseModel::JointEach => {
-                        rms[i] <= SAME * least_of(&SMALLER) && trials[i].is_of_joints()
+                        rms[i] <= SAME * least_of(&[SAFE, JOINTS].concat())
+                            && trials[i].is_of_joints()
                     }
                 },
             }
@@ -479,9 +477,11 @@ fn choose(trials: &[Trial]) -> Option<NoiseChoice> {
         candidates[*i].admitted && more <= SHOWN * error
     };
     // All joints scatter, however little, and a level that the poses cannot tell from none costs nothing but wider intervals.
-    let joints = (0..trials.len()).find(|i| trials[*i].noise == NoiseModel::Joint);
+    let mut joints = JOINTS
+        .iter()
+        .filter_map(|noise| trials.iter().position(|t| t.noise == *noise));
     let chosen = joints
-        .filter(within)
+        .find(within)
         .or_else(|| (0..trials.len()).find(within))?;
     let (less, error) = paired(&scores.surprises[best], &scores.surprises[likeliest]);
     // The levels themselves were found from all poses: as many more of them as chance makes likelier are no evidence.

@@ -32,6 +32,7 @@ impl Edge {
                 effects: j.effects.iter().map(JointEffect::clone_shallow).collect(),
                 candidates: Vec::new(),
                 noise: j.noise,
+                own_noise: j.own_noise,
             }),
             EdgeKind::Measured { covariance, .. } => EdgeKind::Measured {
                 poses: Vec::new(),
@@ -121,6 +122,8 @@ pub struct Joint {
     pub candidates: Vec<Candidate>,
     /// Noise of the reading itself, drawn again for every sample.
     pub noise: Option<GroupId>,
+    /// σ, rad or m, that its noise begins with where it has none here and a [`NoiseModel`](crate::NoiseModel) gives it some.
+    pub own_noise: Option<f64>,
 }
 
 /// An effect in the model.

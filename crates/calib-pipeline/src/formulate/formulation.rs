@@ -87,7 +87,7 @@ pub struct NoiseGroups {
     pub marker: Option<GroupId>,
     /// Positions of bodies.
     pub body_position: Option<GroupId>,
-    /// Joint readings.
+    /// Readings of joints that turn.
     pub joint: Option<GroupId>,
 }
 
@@ -97,7 +97,7 @@ impl Formulation {
     pub fn with_noise(mut self, model: NoiseModel) -> Self {
         if let Some(problem) = self.problem.with_noise_model(model) {
             self.problem = problem;
-            if model != NoiseModel::Joint {
+            if !matches!(model, NoiseModel::Joint | NoiseModel::JointAndSlide) {
                 self.noise.joint = None;
             }
         }
@@ -151,11 +151,21 @@ pub struct MlFit {
 }
 
 impl MlFit {
-    /// Noise of a joint reading that was found, rms over the joints that have any, rad; `None` where none has.
+    /// Noise of the reading of a joint that turns, rms over the joints that have any, rad; `None` where none has.
     #[must_use]
     pub fn joint_sigma(&self) -> Option<f64> {
+        self.sigma_of(NoiseKind::Joint)
+    }
+
+    /// The same of a joint that slides, m.
+    #[must_use]
+    pub fn slide_sigma(&self) -> Option<f64> {
+        self.sigma_of(NoiseKind::Slide)
+    }
+
+    fn sigma_of(&self, kind: NoiseKind) -> Option<f64> {
         let noise = self.solution.noise.iter();
-        let of_joints = noise.filter(|n| n.kind == NoiseKind::Joint && n.samples > 0);
+        let of_joints = noise.filter(|n| n.kind == kind && n.samples > 0);
         let squares: Vec<f64> = of_joints.map(|n| n.sigma * n.sigma).collect();
         let mean = squares.iter().sum::<f64>() / squares.len().max(1) as f64;
         (!squares.is_empty()).then(|| mean.sqrt())

@@ -204,7 +204,9 @@ fn goodness(e: &Evidence<'_>, fit: &MlFit) -> Goodness {
         level.map_or(rigid, |level| level.scatter(e.inputs))
     };
     let beside = s.noise.iter().filter_map(|n| {
-        let stated = stated_sigma(&e.inputs.robot.profile, &n.name).filter(|s| *s > 0.0)?;
+        let of_slide = n.kind == NoiseKind::Slide;
+        let stated =
+            stated_sigma(&e.inputs.robot.profile, &n.name).filter(|s| *s > 0.0 && !of_slide)?;
         let few = (n.samples < ENOUGH).then_some(n.samples);
         let known = n.estimated && n.kind != NoiseKind::Scale;
         let relative = n.relative_error.filter(|_| known)?;

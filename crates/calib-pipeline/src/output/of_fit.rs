@@ -198,15 +198,16 @@ pub(crate) fn noise(e: &Evidence<'_>, fit: &MlFit) -> Vec<calib_report::Noise> {
                 NoiseKind::Position => calib_report::NoiseKind::Position,
                 NoiseKind::Orientation => calib_report::NoiseKind::Orientation,
                 NoiseKind::Joint => calib_report::NoiseKind::Joint,
+                NoiseKind::Slide => calib_report::NoiseKind::Slide,
                 NoiseKind::Scale => calib_report::NoiseKind::Scale,
             },
             unit: match n.kind {
-                NoiseKind::Position => Unit::Meter,
+                NoiseKind::Position | NoiseKind::Slide => Unit::Meter,
                 _ => Unit::Radian,
             },
             sigma: Some(n.sigma),
             relative_error: n.relative_error,
-            stated: stated_sigma(profile, &n.name),
+            stated: stated_sigma(profile, &n.name).filter(|_| n.kind != NoiseKind::Slide),
             samples: n.samples,
             text: calib_report::Noise::method(n.estimated).to_owned(),
         })
@@ -259,6 +260,7 @@ fn noise_model(model: calib_core::NoiseModel) -> calib_report::NoiseModel {
     match model {
         calib_core::NoiseModel::Joint => calib_report::NoiseModel::Joint,
         calib_core::NoiseModel::BodyPose => calib_report::NoiseModel::BodyPose,
+        calib_core::NoiseModel::JointAndSlide => calib_report::NoiseModel::JointAndSlide,
         calib_core::NoiseModel::JointEach => calib_report::NoiseModel::JointEach,
         _ => calib_report::NoiseModel::White,
     }

@@ -116,7 +116,10 @@ pub(crate) fn accuracy_limits(
     let of_errors = OfErrors::of(inputs, held_out, fit);
     let parameters = of_errors.parameters;
     let tracker = tracker.over(inputs, held_out).unwrap_or(0.0);
-    let joints = fit.joint_sigma().unwrap_or(0.0) * of_errors.lever;
+    let joints = f64::hypot(
+        fit.joint_sigma().unwrap_or(0.0) * of_errors.lever,
+        fit.slide_sigma().unwrap_or(0.0) * of_errors.slides,
+    );
     let explained = parameters.powi(2) + tracker.powi(2) + joints.powi(2);
     let rest = (measured.rms_m.powi(2) - explained).max(0.0).sqrt();
     let total = explained + rest.powi(2);
@@ -148,6 +151,8 @@ const ERRORS: usize = 120;
 struct OfErrors {
     /// Root sum of squares over the joints of how far the body moves per radian, rms over the errors, m.
     lever: f64,
+    /// The same of joints that slide: per meter, 1 each.
+    slides: f64,
     /// σ of the body's predicted position, rms over the errors, m.
     parameters: f64,
 }
@@ -157,26 +162,29 @@ impl OfErrors {
         let errors: Vec<&PoseError> = held_out.poses.iter().filter(|p| !p.screened).collect();
         let step = errors.len().div_ceil(ERRORS).max(1);
         let rows = rows_by_label(inputs);
-        let (mut levers, mut variances, mut n) = (0.0, 0.0, 0.0);
+        let (mut levers, mut slides, mut variances, mut n) = (0.0, 0.0, 0.0, 0.0);
         // Markers of one body and posture are alike.
-        let mut known: BTreeMap<(&String, &String), (f64, f64)> = BTreeMap::new();
+        let mut known: BTreeMap<(&String, &String), (f64, f64, f64)> = BTreeMap::new();
         for error in errors.into_iter().step_by(step) {
             let of_body = body_of(inputs, &error.subject);
             let (Some(q), Some((name, body))) = (rows.get(&error.pose), of_body) else {
                 continue;
             };
             let key = (&error.pose, name);
-            let (lever, variance) = *known.entry(key).or_insert_with(|| {
+            let (lever, slide, variance) = *known.entry(key).or_insert_with(|| {
                 let variance = variance_of(inputs, fit, (name, body.link), q);
-                (squared_lever(inputs, body.link, q), variance)
+                let squared = |turning| squared_lever(inputs, body.link, q, turning);
+                (squared(true), squared(false), variance)
             });
             levers += lever;
+            slides += slide;
             variances += variance;
             n += 1.0;
         }
         let rms = |sum: f64| (sum / f64::max(n, 1.0)).sqrt();
         Self {
             lever: rms(levers),
+            slides: rms(slides),
             parameters: rms(variances),
         }
     }
@@ -229,14 +237,14 @@ fn targets(fit: &MlFit, name: &str, link: LinkId) -> Vec<Target> {
     link.map(Target::Frame).into_iter().collect()
 }
 
-/// Sum of squares over the joints of how far a link moves per radian, m².
-fn squared_lever(inputs: &Inputs, link: LinkId, q: &[f64]) -> f64 {
+/// Sum of squares over the joints that turn, or that slide, of how far a link moves per radian or meter.
+fn squared_lever(inputs: &Inputs, link: LinkId, q: &[f64], turning: bool) -> f64 {
     let model = &inputs.robot.model;
     let columns = model.jacobian(q, link);
-    let turning = columns
+    let of_kind = columns
         .iter()
-        .filter(|(id, _)| model.joint(*id).kind.turns());
-    turning
+        .filter(|(id, _)| model.joint(*id).kind.turns() == turning);
+    of_kind
         .map(|(_, c)| c.fixed_rows::<3>(3).norm_squared())
         .sum()
 }

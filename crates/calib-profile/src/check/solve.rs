@@ -185,6 +185,7 @@ fn noise_model(raw: RawNoiseModel) -> Option<NoiseModel> {
         RawNoiseModel::White => Some(NoiseModel::White),
         RawNoiseModel::Joint => Some(NoiseModel::Joint),
         RawNoiseModel::BodyPose => Some(NoiseModel::BodyPose),
+        RawNoiseModel::JointAndSlide => Some(NoiseModel::JointAndSlide),
         RawNoiseModel::JointEach => Some(NoiseModel::JointEach),
     }
 }

@@ -75,11 +75,13 @@ pub enum RawNoiseModel {
     Auto,
     /// Nothing: the weights of plain least squares.
     White,
-    /// The joint angles, with one level.
+    /// The angles of the joints that turn, with one level.
     Joint,
+    /// With one more level for the positions of the joints that slide.
+    JointAndSlide,
     /// The pose of each body with three markers and more.
     BodyPose,
-    /// The joint angles, with a level for each joint.
+    /// The joint positions, with a level for each joint.
     JointEach,
 }
 
@@ -87,7 +89,7 @@ pub enum RawNoiseModel {
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RawNoise {
-    /// What is random from pose to pose: `auto` (default), `white`, `joint`, `body_pose` or `joint_each`.
+    /// What is random from pose to pose: `auto` (default), `white`, `joint`, `joint_and_slide`, `body_pose` or `joint_each`.
     #[serde(default)]
     pub model: RawNoiseModel,
     /// Standard deviation of the joint angles from pose to pose, deg; estimated when absent.

@@ -35,7 +35,7 @@ pub(crate) fn noise(report: &Report, rest: &str) -> Vec<String> {
     let (joints, tracker): (Vec<&Noise>, Vec<&Noise>) = report
         .noise
         .iter()
-        .partition(|noise| noise.kind == NoiseKind::Joint);
+        .partition(|noise| matches!(noise.kind, NoiseKind::Joint | NoiseKind::Slide));
     let lines: Vec<String> = tracker
         .iter()
         .chain(&joints)
@@ -61,6 +61,9 @@ impl NoiseModel {
         match self {
             Self::White => "none (ordinary least squares)",
             Self::Joint => "the joint positions, one level",
+            Self::JointAndSlide => {
+                "the joint positions, one level for the joints that turn and one for those that slide"
+            }
             Self::BodyPose => "the pose of each body",
             Self::JointEach => "the joint positions, a level each",
         }

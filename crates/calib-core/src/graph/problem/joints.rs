@@ -32,6 +32,7 @@ impl Problem {
                 effects: Vec::new(),
                 candidates: Vec::new(),
                 noise: None,
+                own_noise: None,
             }),
         )
     }
@@ -221,6 +222,13 @@ impl Problem {
     pub fn joint_noise(&mut self, edge: EdgeId, group: GroupId) {
         if let Some(joint) = self.joint_mut(edge, "joint_noise") {
             joint.noise = Some(group);
+        }
+    }
+
+    /// Lets a joint have noise, begun with this σ (rad or m), where the poses speak for it: it has no common level with that of the others.
+    pub fn joint_own_noise(&mut self, edge: EdgeId, sigma: f64) {
+        if let Some(joint) = self.joint_mut(edge, "joint_own_noise") {
+            joint.own_noise = Some(sigma);
         }
     }
 }

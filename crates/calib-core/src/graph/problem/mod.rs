@@ -44,10 +44,20 @@ pub enum NoiseKind {
     Position,
     /// Body orientation or direction, rad.
     Orientation,
-    /// A joint's reading, rad or m.
+    /// Reading of a joint that turns, rad.
     Joint,
+    /// Reading of a joint that slides, m.
+    Slide,
     /// A factor on given covariances.
     Scale,
+}
+
+impl NoiseKind {
+    /// Of the reading of a joint.
+    #[must_use]
+    pub fn is_of_joints(self) -> bool {
+        matches!(self, Self::Joint | Self::Slide)
+    }
 }
 
 /// A noise level that several measurements share.

@@ -5,7 +5,8 @@ use std::collections::BTreeSet;
 use nalgebra::Vector6;
 use serde::{Deserialize, Serialize};
 
-use crate::graph::edge::EdgeKind;
+use crate::graph::axis::Axis;
+use crate::graph::edge::{Edge, EdgeKind};
 use crate::graph::ids::{EdgeId, FrameId, GroupId};
 use crate::graph::measurement::MeasurementKind;
 use crate::graph::problem::{NoiseKind, Problem};
@@ -17,17 +18,25 @@ use crate::graph::problem::{NoiseKind, Problem};
 pub enum NoiseModel {
     /// Nothing: every measurement has its own noise. The weights are those of plain least squares.
     White,
-    /// The joints' readings, with one σ.
+    /// The readings of the joints that turn, with one σ.
     Joint,
+    /// With one more σ for those that slide.
+    JointAndSlide,
     /// The pose of each marker body, turns and shifts.
     BodyPose,
-    /// The joints' readings, each joint with a σ of its own.
+    /// The joints' readings, each joint with a σ of its own, those that slide too.
     JointEach,
 }
 
 impl NoiseModel {
     /// All of them, in order of growth.
-    pub const ALL: [Self; 4] = [Self::White, Self::Joint, Self::BodyPose, Self::JointEach];
+    pub const ALL: [Self; 5] = [
+        Self::White,
+        Self::Joint,
+        Self::JointAndSlide,
+        Self::BodyPose,
+        Self::JointEach,
+    ];
 }
 
 /// Markers from which the noise of a body's pose is distinguishable from their own.
@@ -56,6 +65,14 @@ impl Problem {
             NoiseModel::White => out.without_joint_noise(&noisy),
             NoiseModel::Joint if noisy.is_empty() => return None,
             NoiseModel::Joint => {}
+            NoiseModel::JointAndSlide => {
+                let sliding = self.joints_of_own_noise();
+                let (_, kind, sigma) = *sliding.first()?;
+                let common = out.noise_group("slide", kind, sigma, true);
+                for (edge, ..) in sliding {
+                    out.joint_noise(EdgeId::of(edge), common);
+                }
+            }
             NoiseModel::BodyPose => {
                 out.without_joint_noise(&noisy);
                 let bodies = out.marker_bodies();
@@ -67,10 +84,16 @@ impl Problem {
                 }
             }
             NoiseModel::JointEach => {
-                if noisy.len() < 2 {
+                let sliding = self.joints_of_own_noise();
+                if noisy.len() < 2 && sliding.is_empty() {
                     return None;
                 }
                 out.without_joint_noise(&noisy);
+                for (edge, kind, sigma) in sliding {
+                    let name = format!("joint {}", self.edges[edge].name);
+                    let own = out.noise_group(&name, kind, sigma, true);
+                    out.joint_noise(EdgeId::of(edge), own);
+                }
                 for &(edge, group) in &noisy {
                     let name = format!("joint {}", self.edges[edge].name);
                     let stated = self.groups[group.index()].clone();
@@ -80,6 +103,22 @@ impl Problem {
             }
         }
         Some(out)
+    }
+
+    /// Joints that have noise of their own only, with its kind and the σ to begin with.
+    fn joints_of_own_noise(&self) -> Vec<(usize, NoiseKind, f64)> {
+        let of = |(e, edge): (usize, &Edge)| {
+            let EdgeKind::Joint(joint) = &edge.kind else {
+                return None;
+            };
+            let kind = match joint.axis {
+                Axis::Revolute(_) => NoiseKind::Joint,
+                Axis::Prismatic(_) => NoiseKind::Slide,
+            };
+            let sigma = joint.own_noise.filter(|_| joint.noise.is_none())?;
+            Some((e, kind, sigma))
+        };
+        self.edges.iter().enumerate().filter_map(of).collect()
     }
 
     fn without_joint_noise(&mut self, noisy: &[(usize, GroupId)]) {

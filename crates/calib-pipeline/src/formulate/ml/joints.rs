@@ -15,6 +15,8 @@ use crate::prepare::loads::Loads;
 
 /// Joint noise that estimation starts from, rad (0.01°).
 pub const JOINT_SIGMA: f64 = 1.7e-4;
+/// The same of a joint that slides, m.
+const SLIDE_SIGMA: f64 = 1e-4;
 /// A revolute joint that moves less than this in the fitted recordings did not move, rad.
 const MOVED: f64 = 1e-3;
 
@@ -148,11 +150,13 @@ pub(super) fn add_joint(
     formulation.joints[joint.index()] = Some(edge);
     problem.joint_reach(edge, inputs.robot.masses.reach()[joint.index()]);
     formulation.loaded |= add_effects(problem, profile, model, joint, edge, &free, rows);
-    if let Some(group) = noise
-        && moved
-        && !slides
-    {
-        problem.joint_noise(edge, group);
+    match noise {
+        // Meters have no common level with angles, and a profile states that of angles.
+        _ if slides && moved && profile.solve.noise.joint != Some(0.0) => {
+            problem.joint_own_noise(edge, SLIDE_SIGMA);
+        }
+        Some(group) if moved && !slides => problem.joint_noise(edge, group),
+        _ => {}
     }
 }
 
