@@ -9,6 +9,7 @@ mod book;
 mod cell;
 mod changes;
 mod clocks;
+mod computed;
 mod contacts;
 mod data_faults;
 mod default_run;

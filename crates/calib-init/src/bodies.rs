@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use calib_checks::rigid_body::rigid_groups;
-use calib_recording::{BodyStream, Filled, MarkerStream};
+use calib_recording::{BodyStream, ColumnMap, Filled, MarkerStream};
 use calib_urdf::RobotModel;
 use nalgebra::Point3;
 
@@ -277,17 +277,24 @@ pub fn without_left_out(
 ) -> Result<(), InitError> {
     let left_out = facts.iter().flat_map(|fact| match &fact.about {
         About::Duplicate { marker, .. } => std::slice::from_ref(marker),
-        About::Seldom { markers } => markers,
+        About::Seldom { markers } | About::Computed { markers, .. } => markers,
         _ => &[],
     });
     let left_out: BTreeSet<&String> = left_out.collect();
+    let bodies = facts.iter().filter_map(|fact| match &fact.about {
+        About::Computed { body, markers, .. } if markers.is_empty() => Some(body),
+        _ => None,
+    });
+    let bodies: BTreeSet<&String> = bodies.collect();
     for source in sources {
         let Some(mut map) = source.columns.clone() else {
             continue;
         };
-        let before = map.markers.len();
+        let count = |map: &ColumnMap| map.markers.len() + map.bodies.len();
+        let before = count(&map);
         map.markers.retain(|name, _| !left_out.contains(name));
-        if map.markers.len() < before {
+        map.bodies.retain(|name, _| !bodies.contains(name));
+        if count(&map) < before {
             *source = source.with_columns(model, map)?;
         }
     }

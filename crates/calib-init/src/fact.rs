@@ -226,6 +226,21 @@ pub enum About {
         /// The one that it repeats.
         of: String,
     },
+    /// A body that fits the nominal robot closer than the tracker lets any measured body: left out.
+    Computed {
+        /// Its name.
+        body: String,
+        /// Its markers; empty: a pose.
+        markers: Vec<String>,
+        /// The columns of the markers.
+        columns: Vec<String>,
+        /// Its residual, rms, m.
+        rms: f64,
+        /// The body that fits worst.
+        other: String,
+        /// Its residual, rms, m.
+        next: f64,
+    },
     /// Markers that are seen in too few rows: left out.
     Seldom {
         /// Their names.

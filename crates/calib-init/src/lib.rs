@@ -4,6 +4,7 @@ pub mod ask;
 pub mod bodies;
 pub mod checked;
 pub mod columns;
+pub mod computed;
 pub mod correct;
 pub mod corrected;
 pub mod edit;

@@ -54,7 +54,17 @@ pub struct Choice {
     pub all: Vec<(LinkId, f64)>,
 }
 
-impl Scene<'_> {
+impl<'a> Scene<'a> {
+    /// Bodies and tables of a robot.
+    #[must_use]
+    pub fn new(model: &'a RobotModel, bodies: &'a [Found], tables: &'a [Poses]) -> Self {
+        Self {
+            model,
+            bodies,
+            tables,
+        }
+    }
+
     /// The engine's input for these bodies on these links.
     #[must_use]
     pub fn data(&self, chain: &Chain, on: &[(usize, LinkId)]) -> Data {

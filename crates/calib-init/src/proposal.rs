@@ -4,7 +4,7 @@ use calib_recording::ColumnMap;
 use calib_urdf::{JointId, LinkId};
 use serde::Serialize;
 
-use crate::fact::Fact;
+use crate::fact::{About, Fact};
 use crate::session::{Stream, Use};
 use crate::skeleton::Skeleton;
 
@@ -54,6 +54,25 @@ pub struct Noise {
     pub marker: Option<f64>,
     /// Of a body: of a coordinate, m, and about an axis, rad.
     pub body: Option<(f64, f64)>,
+}
+
+impl Noise {
+    /// What was found of it.
+    #[must_use]
+    pub fn of(facts: &[Fact]) -> Self {
+        let mut noise = Self::default();
+        for fact in facts {
+            match fact.about {
+                About::MarkerSigma { sigma, .. } => noise.marker = Some(sigma),
+                About::BodySigma {
+                    position,
+                    orientation,
+                } => noise.body = Some((position, orientation)),
+                _ => {}
+            }
+        }
+        noise
+    }
 }
 
 /// Everything that the profile says.

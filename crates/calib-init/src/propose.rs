@@ -1,12 +1,13 @@
 //! From a URDF and files to a proposal.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
-use calib_recording::LengthUnit;
+use calib_recording::{LengthUnit, Poses};
 use calib_urdf::{JointId, LinkId, RobotModel, doubt};
 
 use crate::ask::{apply_one, ask, next_correction};
 use crate::bodies::{self, Found};
+use crate::computed;
 use crate::correct;
 use crate::corrected;
 use crate::error::InitError;
@@ -310,16 +311,15 @@ fn with_recordings(
             poses = tables::tables(model, proposal, &drafts, &sources, &found)?;
         }
     }
-    let scene = Scene {
-        model,
-        bodies: &found,
-        tables: &poses,
-    };
-    let mut apart = scene.not_rigid();
-    apart.retain(|body| *body >= fixed.len());
+    let seen = (sources.as_mut_slice(), poses.as_slice());
     let names = known.map(Known::names_of_bodies).unwrap_or_default();
-    found = bodies::split(model, found, &mut of_bodies, &apart, &names);
+    let facts = (&mut of_bodies, of_files.as_mut_slice());
+    let fewer = rigid_and_measured(model, &names, seen, &mut found, facts, &fixed)?;
     proposal.bodies = on_link(&found, start, &fixed);
+    if fewer {
+        proposal.recordings = recordings(&drafts, &sources);
+        poses = tables::tables(model, proposal, &drafts, &sources, &found)?;
+    }
     let mut of_links = Vec::new();
     for _ in 0..=CORRECTIONS {
         let scene = Scene {
@@ -351,7 +351,7 @@ fn with_recordings(
     if corrections.iter().any(corrected::is_correction) {
         corrected::noise(&mut of_bodies, bodies::bodies(model, &sources, &names).1);
     }
-    proposal.noise = noise(&of_bodies);
+    proposal.noise = Noise::of(&of_bodies);
     if let Some(known) = known {
         of_bodies = known.of_noise(of_bodies);
         of_uses = known.of_uses(model, (&drafts, &poses), of_uses);
@@ -472,17 +472,29 @@ fn recordings(drafts: &[Draft], sources: &[Source]) -> Vec<Recording> {
     drafts.iter().map(of).collect()
 }
 
-fn noise(facts: &[Fact]) -> Noise {
-    let mut noise = Noise::default();
-    for fact in facts {
-        match fact.about {
-            About::MarkerSigma { sigma, .. } => noise.marker = Some(sigma),
-            About::BodySigma {
-                position,
-                orientation,
-            } => noise.body = Some((position, orientation)),
-            _ => {}
-        }
+/// Bodies of two markers that are not one, apart, and without those that a controller computed; whether there are any of those.
+fn rigid_and_measured(
+    model: &RobotModel,
+    names: &BTreeSet<String>,
+    (sources, poses): (&mut [Source], &[Poses]),
+    found: &mut Vec<Found>,
+    (of_bodies, of_files): (&mut Vec<Fact>, &mut [Fact]),
+    fixed: &[(usize, LinkId)],
+) -> Result<bool, InitError> {
+    let mut apart = Scene::new(model, found, poses).not_rigid();
+    apart.retain(|body| *body >= fixed.len());
+    *found = bodies::split(model, std::mem::take(found), of_bodies, &apart, names);
+    let noise = Noise::of(of_bodies).marker;
+    let computed = computed::computed(
+        &Scene::new(model, found, poses),
+        sources,
+        fixed.len(),
+        noise,
+    );
+    let any = !computed.is_empty();
+    if any {
+        computed::leave_out(computed, found, of_bodies, of_files);
+        bodies::without_left_out(model, sources, of_bodies)?;
     }
-    noise
+    Ok(any)
 }

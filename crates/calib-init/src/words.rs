@@ -290,11 +290,35 @@ fn of_columns(about: &About) -> String {
     }
 }
 
+fn of_computed(about: &About) -> String {
+    let About::Computed {
+        body,
+        columns,
+        rms,
+        other,
+        next,
+        ..
+    } = about
+    else {
+        return String::new();
+    };
+    let what = match columns.is_empty() {
+        true => format!("The coordinates of `{body}`"),
+        false => quoted(columns),
+    };
+    format!(
+        "{what} are left out: they fit the nominal robot to {}, `{other}` to {}. A controller computed them from its joints; they are no measurement.",
+        mm(*rms),
+        mm(*next)
+    )
+}
+
 fn of_session(about: &About) -> String {
     match about {
         About::Duplicate { marker, of } => {
             format!("`{marker}` repeats `{of}` in every row and is left out.")
         }
+        About::Computed { .. } => of_computed(about),
         About::Seldom { markers } => {
             format!("Seen in fewer than four rows and left out: {}.", quoted(markers))
         }

@@ -207,6 +207,9 @@ super::topic! {
         "undecided": Error,
             "The recordings fit the nominal robot to {none} rms, where nominal errors explain {limit}; no single mistake and no pair explains it[[; the best attempt, {leading:code}, leaves {best}]].[[ Without {recordings:code} the others fit to {rest}.]][[ Joints without a column were taken to stand at 0, and nothing fits where one of them moved: {assumed:code}.]]",
             "Check that URDF and robot are the same model, the links of the bodies, and that joints and tracker recorded the same motion.";
+        "frames": Error,
+            "Alone, body `{body}` fits the nominal robot to {alone} rms, and without it the others fit to {rest}. Together they fit to {none} rms, where nominal errors explain {limit}: they are not seen in one frame.",
+            "If a controller computed the coordinates of `{body}`, or another tracker measured them, leave this body out. Otherwise look for what moved between its rows and those of the others: the tracker, or a joint without a column.";
         "large": Warning,
             "The recordings fit the nominal robot to {none} rms, where nominal errors explain {limit}; no single mistake explains it.[[ Joints without a column were taken to stand at 0, and nothing fits where one of them moved: {assumed:code}.]]",
             "Check the URDF against a drawing, and validate with separate poses.";
@@ -216,7 +219,10 @@ super::topic! {
     }
     /// Coordinates that nobody measured.
     NOT_MEASURED = "not-measured" {
-        "": Error,
+        "body": Error,
+            "The coordinates of body `{body}` fit the nominal robot to {none} rms, those of `{other}` to {next}. No robot is that close to its drawing, and no tracker is that precise: the coordinates of `{body}` were computed from the joint values, by a controller or a simulation.",
+            "Leave this body out. The position of the tool that a controller shows or logs is no measurement.";
+        "all": Error,
             "The recordings fit the nominal robot to {none} rms. No robot is that close to its drawing, and no tracker is that precise: these coordinates were computed from the joint values, by a controller or a simulation, and say nothing of the real robot.",
             "Record what a tracker measures. The position of the tool that a controller shows or logs is no measurement; leave its columns out.";
     }

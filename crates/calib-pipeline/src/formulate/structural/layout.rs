@@ -1,6 +1,6 @@
 //! Recordings and nominal robot as the engine of structural hypotheses takes them.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_checks::structural::{
     Body, BodyIndex, Chain, Data, JointIndex, LinkIndex, Measured, RecordingIndex, Scope,
@@ -72,6 +72,14 @@ impl<'a> Layout<'a> {
             }
         }
         layout
+    }
+
+    /// Forgets these bodies, by index.
+    pub fn leave_out(&mut self, bodies: &BTreeSet<usize>) {
+        for body in bodies.iter().rev() {
+            self.data.bodies.remove(*body);
+            self.bodies.remove(*body);
+        }
     }
 
     /// Rows with joint values; a joint without a column has none, unless the profile holds it.

@@ -4,6 +4,7 @@
 //! ([`calib_checks::structural`]) in one call over all fitted recordings; what it decides becomes findings. Where the
 //! fitted recordings agree with the robot, those of the validation join them in a second call.
 
+mod bodies;
 mod codes;
 mod declared;
 mod jump;
@@ -68,7 +69,7 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
     let Some((chain, couplings)) = chain(inputs, tracks) else {
         return Structural::default();
     };
-    let layout = Layout::new(inputs, tracks, &chain, false);
+    let mut layout = Layout::new(inputs, tracks, &chain, false);
     let mut found = Structural {
         findings: Vec::new(),
         rows_count: true,
@@ -83,6 +84,10 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
     let prior = &inputs.robot.profile.solve.prior;
     options.prior_angle = options.prior_angle.max(prior.angle);
     options.prior_length = options.prior_length.max(prior.position);
+    let computed = bodies::computed(&layout, options.sigma);
+    let of_bodies = computed.iter().map(|one| one.finding(&layout));
+    found.findings.extend(of_bodies);
+    layout.leave_out(&computed.iter().map(|one| one.body).collect());
     // Without a body there is nothing to compare; what a reader lets through does not contradict itself.
     let Ok(outcome) = explain(&layout.data, &options) else {
         return found;
@@ -99,7 +104,7 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
     beside.retain(|finding| !without::says(&found.findings, finding));
     found.findings.extend(beside);
     let too_few = matches!(outcome.decision, Decision::TooFewData { .. });
-    found.rows_count = consistent || too_few;
+    found.rows_count = (consistent || too_few) && computed.is_empty();
     if found.rows_count {
         let mut all = Layout::new(inputs, tracks, &chain, true);
         all.data = apply_all(&found.of_fit, &all.data);
@@ -135,7 +140,8 @@ fn not_measured(layout: &Layout<'_>, outcome: &Outcome, sigma: f64) -> Option<Fi
             recordings,
             ..Subject::default()
         };
-        Finding::new(catalog::NOT_MEASURED, subject).with("none", Fact::meters(outcome.rms))
+        Finding::of_kind(catalog::NOT_MEASURED, "all", subject)
+            .with("none", Fact::meters(outcome.rms))
     })
 }
 
@@ -234,8 +240,12 @@ fn readings(layout: &Layout<'_>, outcome: &Outcome, found: &WrongReadings) -> Fi
 fn decision(layout: &Layout<'_>, outcome: &Outcome) -> Vec<Finding> {
     match &outcome.decision {
         Decision::Named(named) => {
-            let of_columns = without::in_place_of(layout, outcome, named);
-            of_columns.map_or_else(|| named::findings(layout, outcome, named), |f| vec![f])
+            // What leaves more than nominal errors explain is not all, where something else is.
+            let frames = (named.within_expected == Some(false))
+                .then(|| bodies::in_another_frame(layout, outcome))
+                .flatten();
+            let other = frames.or_else(|| without::in_place_of(layout, outcome, named));
+            other.map_or_else(|| named::findings(layout, outcome, named), |f| vec![f])
         }
         Decision::Undecided { .. } if outcome.jump.is_some() => {
             let found = outcome.jump.iter();
@@ -253,6 +263,9 @@ fn decision(layout: &Layout<'_>, outcome: &Outcome) -> Vec<Finding> {
             let apart = without::apart(layout, outcome);
             let of_columns = |apart: &without::Apart| apart.of_columns(layout, outcome);
             if let Some(finding) = apart.as_ref().and_then(of_columns) {
+                return vec![finding];
+            }
+            if let Some(finding) = bodies::in_another_frame(layout, outcome) {
                 return vec![finding];
             }
             let limit = outcome.expected.map(|e| e.limit);

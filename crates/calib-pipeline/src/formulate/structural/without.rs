@@ -10,7 +10,7 @@ use calib_finding::{Fact, Finding, Subject, catalog};
 use super::layout::Layout;
 
 /// What is left out must have raised the residual by this, as a mistake that is named does.
-const DIVIDED: f64 = 1.5;
+pub(super) const DIVIDED: f64 = 1.5;
 
 /// Recordings that disagree with the others.
 pub(super) struct Apart {

@@ -1,0 +1,92 @@
+//! Bodies whose coordinates a controller computed from its joints: no measurement.
+
+use calib_checks::structural::Chain;
+
+use crate::bodies::Found;
+use crate::fact::{About, Fact, Place};
+use crate::links::Scene;
+use crate::source::Source;
+
+/// What is written with one decimal of a millimeter, m, and joints with two of a degree.
+const COMPUTED: f64 = 1e-4;
+/// What a body that moves leaves on the root, m.
+const MOVED: f64 = 0.01;
+/// Part of the noise that was found: of as many coordinates as there are, none scatters so little by chance.
+const OF_NOISE: f64 = 0.3;
+/// Part of what another body leaves.
+const BELOW: f64 = 0.1;
+
+/// Bodies from `fixed` on that follow the nominal robot closer than the tracker's noise, m, lets any measured body, while another one shows that the robot
+/// is not that close to its drawing.
+#[must_use]
+pub fn computed(
+    scene: &Scene<'_>,
+    sources: &[Source],
+    fixed: usize,
+    noise: Option<f64>,
+) -> Vec<(usize, Fact)> {
+    let columns = |markers: &[String]| -> Vec<String> {
+        let maps = || sources.iter().filter_map(|source| source.columns.as_ref());
+        let of = |marker: &String| maps().find_map(|map| map.markers.get(marker));
+        markers.iter().filter_map(of).flatten().cloned().collect()
+    };
+    let limit = COMPUTED.min(OF_NOISE * noise.unwrap_or(f64::INFINITY));
+    let count = scene.bodies.len();
+    let Ok(chain) = Chain::from_model(scene.model) else {
+        return Vec::new();
+    };
+    if count < 2 {
+        return Vec::new();
+    }
+    let rms: Vec<Option<f64>> = (0..count)
+        .map(|body| {
+            let choice = scene.choose(&chain, body)?;
+            // One that hardly moves does not show what it follows.
+            let of_root = choice
+                .all
+                .iter()
+                .find(|(link, _)| *link == scene.model.root());
+            of_root
+                .is_some_and(|(_, rms)| *rms > MOVED)
+                .then_some(choice.rms)
+        })
+        .collect();
+    let found = (fixed..count).filter_map(|body| {
+        let own = rms[body].filter(|rms| *rms < limit)?;
+        let others = (0..count).filter(|other| *other != body);
+        let others = others.filter_map(|other| Some((other, rms[other]?)));
+        let (other, next) = others.max_by(|a, b| a.1.total_cmp(&b.1))?;
+        let one = &scene.bodies[body];
+        let about = About::Computed {
+            body: one.name.clone(),
+            columns: columns(&one.markers),
+            markers: one.markers.clone(),
+            rms: own,
+            other: scene.bodies[other].name.clone(),
+            next,
+        };
+        (own < BELOW * next).then(|| (body, Fact::new(Place::Recordings, about)))
+    });
+    found.collect()
+}
+
+/// Forgets these bodies, and what was said of them.
+pub fn leave_out(
+    computed: Vec<(usize, Fact)>,
+    found: &mut Vec<Found>,
+    of_bodies: &mut Vec<Fact>,
+    of_files: &mut [Fact],
+) {
+    for (body, fact) in computed.into_iter().rev() {
+        let place = Place::Body(found.remove(body).name);
+        of_bodies.retain(|fact| fact.place != place);
+        of_bodies.push(fact);
+    }
+    // What stands beside such a position in the file needs no quaternion.
+    for fact in of_files {
+        if let About::Ignored { orientation, .. } = &mut fact.about {
+            orientation.clear();
+            *fact = Fact::new(fact.place.clone(), fact.about.clone());
+        }
+    }
+}
