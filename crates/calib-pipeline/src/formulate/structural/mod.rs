@@ -5,6 +5,7 @@
 //! fitted recordings agree with the robot, those of the validation join them in a second call.
 
 mod codes;
+mod columns;
 mod declared;
 mod jump;
 mod layout;

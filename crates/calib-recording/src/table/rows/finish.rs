@@ -74,6 +74,7 @@ impl Rows<'_> {
         }
         Ok(Recording {
             meta: Meta {
+                joint_columns: self.layout.joint_columns(),
                 conversions: self.layout.conversions,
                 findings,
                 ..Meta::default()
