@@ -22,6 +22,7 @@ pub mod mistake;
 pub mod name;
 pub mod proposal;
 mod propose;
+mod quaternions;
 pub mod robot;
 pub mod session;
 pub mod signs;

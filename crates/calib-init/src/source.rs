@@ -144,6 +144,12 @@ impl Source {
         )
     }
 
+    /// What the file calls a body or marker of the profile.
+    #[must_use]
+    pub fn name_in_file<'n>(&'n self, name: &'n str) -> &'n str {
+        self.renamed.get(name).map_or(name, String::as_str)
+    }
+
     /// It has joints of this robot.
     #[must_use]
     pub fn has_joints(&self) -> bool {
