@@ -1,6 +1,6 @@
 //! What a column's name says: its words, its unit, its number.
 
-use calib_recording::{AngleUnit, LengthUnit, TimeUnit};
+use calib_recording::{AngleUnit, LengthUnit, StatedUnit, TimeUnit};
 
 /// A unit that stands in a name.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,6 +11,19 @@ pub enum NamedUnit {
     Length(LengthUnit),
     /// Of a time.
     Time(TimeUnit),
+    /// Of something else, such as a speed or a torque.
+    Other,
+}
+
+impl From<StatedUnit> for NamedUnit {
+    fn from(unit: StatedUnit) -> Self {
+        match unit {
+            StatedUnit::Angle(unit) => Self::Angle(unit),
+            StatedUnit::Length(unit) => Self::Length(unit),
+            StatedUnit::Time(unit) => Self::Time(unit),
+            _ => Self::Other,
+        }
+    }
 }
 
 /// A name without its unit, and the unit.
@@ -61,13 +74,10 @@ impl NamedUnit {
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
-            Self::Angle(AngleUnit::Rad) => "rad",
-            Self::Angle(AngleUnit::Deg) => "deg",
+            Self::Angle(unit) => unit.name(),
             Self::Length(unit) => unit.name(),
-            Self::Time(TimeUnit::S) => "s",
-            Self::Time(TimeUnit::Ms) => "ms",
-            Self::Time(TimeUnit::Us) => "us",
-            Self::Time(TimeUnit::Ns) => "ns",
+            Self::Time(unit) => unit.name(),
+            Self::Other => "",
         }
     }
 }

@@ -91,6 +91,7 @@ mod tests {
                 .collect(),
             decimal_comma: false,
             line: 1,
+            units: Vec::new(),
             delimiter: Delimiter::Comma,
         }
     }
