@@ -58,6 +58,7 @@ pub fn guess(model: &RobotModel, header: &Header) -> Guess {
         guess.facts.push(About::Ignored {
             orientation: unread::orientation(header, &ignored),
             times: time.then(|| unread::times(header, &ignored)).flatten(),
+            parts: time.then(|| unread::parts(header)).flatten(),
             columns: ignored,
         });
     }
@@ -91,6 +92,7 @@ fn time(header: &Header, guess: &mut Guess, used: &mut BTreeSet<usize>) {
         return;
     };
     let stated = match header.unit(i).unit {
+        _ if header.dates[i] => Some(TimeUnit::S),
         Some(NamedUnit::Time(unit)) => Some(unit),
         _ => None,
     };
@@ -218,9 +220,11 @@ fn tracked(
 /// Columns of joints.
 fn joints(model: &RobotModel, header: &Header, guess: &mut Guess, used: &mut BTreeSet<usize>) {
     let free = |used: &BTreeSet<usize>, i: &usize| !used.contains(i) && header.has_numbers(*i);
-    let mut found: BTreeMap<JointId, usize> = BTreeMap::new();
+    let mut found = by_texts(model, header, used);
     let stem = |i: usize| stem_of(&header.names[i]);
-    for joint in model.independent_joints() {
+    let mut unnamed: Vec<JointId> = model.independent_joints().collect();
+    unnamed.retain(|joint| !found.contains_key(joint));
+    for joint in unnamed {
         let wanted = &model.joint(joint).name;
         let columns = (0..header.names.len()).filter(|i| free(used, i));
         let columns: Vec<usize> = columns.filter(|i| fits(model, joint, header, *i)).collect();
@@ -288,6 +292,36 @@ fn joints(model: &RobotModel, header: &Header, guess: &mut Guess, used: &mut BTr
             }
         }
     }
+}
+
+/// Joints whose names stand in the cells of a column beside each: `field.name0` and `field.position0` of `rostopic echo -p`. The columns of positions
+/// are used, also where a name is that of no joint or changes from row to row: their order says nothing.
+fn by_texts(
+    model: &RobotModel,
+    header: &Header,
+    used: &mut BTreeSet<usize>,
+) -> BTreeMap<JointId, usize> {
+    let mut found = BTreeMap::new();
+    for (i, name) in header.names.iter().enumerate() {
+        let Some((before, number, "")) = name::numbered(name) else {
+            continue;
+        };
+        let Some(position) = before
+            .strip_suffix("name")
+            .and_then(|of| header.position(&format!("{of}position{number}")))
+            .filter(|_| !header.has_numbers(i))
+        else {
+            continue;
+        };
+        used.insert(position);
+        let mut joints = model.independent_joints();
+        let text = header.texts[i].as_ref();
+        if let Some(joint) = joints.find(|j| Some(&model.joint(*j).name) == text) {
+            used.insert(i);
+            found.insert(joint, position);
+        }
+    }
+    found
 }
 
 /// The unit of a column, in its name or in a row of units, does not speak against the joint.

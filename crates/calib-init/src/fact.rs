@@ -218,6 +218,8 @@ pub enum About {
         orientation: Vec<String>,
         /// The one that seems to hold times as text.
         times: Option<String>,
+        /// Those that hold whole seconds and the parts of a second.
+        parts: Option<(String, String)>,
     },
     /// A marker that repeats another one in every row: left out.
     Duplicate {

@@ -1,6 +1,6 @@
 //! The header of a delimited table, and the first of its numbers.
 
-use calib_recording::{Delimiter, StatedUnit, stated_separator, unit_row, utf8};
+use calib_recording::{Delimiter, StatedUnit, date_time, stated_separator, unit_row, utf8};
 
 use crate::name::{self, NamedUnit, Unit};
 
@@ -16,6 +16,10 @@ pub struct Header {
     pub names: Vec<String>,
     /// `[column][row]`: the first rows; `None` where a cell is not a number.
     pub columns: Vec<Vec<Option<f64>>>,
+    /// Columns whose numbers are dates with a time of day, in seconds since 1970.
+    pub dates: Vec<bool>,
+    /// The one text of a column, where it is the same in all rows.
+    pub texts: Vec<Option<String>>,
     /// Numbers are written `1,5`.
     pub decimal_comma: bool,
     /// The last line above the numbers, from 1: the header, or the row of units below it.
@@ -119,19 +123,34 @@ pub fn header(bytes: &[u8]) -> Option<Header> {
     let decimal_comma =
         separator != Some(',') && rows.iter().any(|row| cells(row, separator).any(comma));
     let mut columns = vec![Vec::new(); names.len()];
-    for line in rows {
+    let mut dates = vec![false; names.len()];
+    let mut texts: Vec<Option<String>> = Vec::new();
+    for (r, line) in rows.iter().enumerate() {
         let mut row = cells(line, separator);
-        for column in &mut columns {
-            let number = row.next().and_then(|cell| match decimal_comma {
+        for (i, column) in columns.iter_mut().enumerate() {
+            let cell = row.next().unwrap_or_default();
+            let number = match decimal_comma {
                 true => cell.replacen(',', ".", 1).parse::<f64>().ok(),
                 false => cell.parse::<f64>().ok(),
-            });
-            column.push(number.filter(|x| x.is_finite()));
+            };
+            let date = || date_time(cell).map(|date| date.seconds);
+            let value = number.or_else(date);
+            dates[i] |= number.is_none() && value.is_some();
+            column.push(value.filter(|x| x.is_finite()));
+            let text = value.is_none() && !cell.is_empty();
+            if r == 0 {
+                texts.push(text.then(|| cell.to_owned()));
+            } else if texts[i].as_deref() != Some(cell) {
+                texts[i] = None;
+            }
         }
     }
+    texts.resize(names.len(), None);
     Some(Header {
         names,
         columns,
+        dates,
+        texts,
         decimal_comma,
         line: above as u64 + 1,
         units,

@@ -133,7 +133,9 @@ pub const PARTS_OF_SECONDS: [&str; 6] = [
 /// How well a name says that a column is the time of its row, best first: a word alone, the stamp of a message, a word among others.
 #[must_use]
 pub fn time(name: &str) -> Option<u8> {
-    const ALONE: [&str; 11] = [
+    const ALONE: [&str; 13] = [
+        "date",
+        "datetime",
         "t",
         "time",
         "timestamp",
@@ -146,7 +148,8 @@ pub fn time(name: &str) -> Option<u8> {
         "zeitstempel",
         "temps",
     ];
-    const AMONG: [&str; 6] = [
+    const AMONG: [&str; 7] = [
+        "datetime",
         "time",
         "timestamp",
         "timestamps",
@@ -161,8 +164,10 @@ pub fn time(name: &str) -> Option<u8> {
     let words = words(unit.stem);
     let all: Vec<&str> = words.iter().map(String::as_str).collect();
     match all.as_slice() {
+        // When `rostopic` received a message: later than its own stamp.
+        [_] if name.starts_with('%') => Some(2),
         [word] if ALONE.contains(word) => Some(0),
-        ["header", "stamp", ..] => Some(1),
+        ["header", "stamp", ..] | [_, "header", "stamp"] => Some(1),
         words if words.iter().any(|w| AMONG.contains(w)) => Some(2),
         _ => None,
     }
@@ -364,6 +369,7 @@ mod tests {
             assert_eq!(time(name), None, "{name}");
         }
         assert!(time("header.stamp") < time("rosbagTimestamp"));
+        assert!(time("field.header.stamp") < time("%time"));
     }
 
     #[test]

@@ -271,6 +271,7 @@ fn of_columns(about: &About) -> String {
             columns,
             orientation,
             times,
+            parts,
         } => {
             let mut text = format!("Not used: {}.", quoted(columns));
             if !orientation.is_empty() {
@@ -281,7 +282,12 @@ fn of_columns(about: &About) -> String {
             }
             if let Some(times) = times {
                 text += &format!(
-                    " `{times}` seems to hold times as text: without times every row is a pose at rest. Write them in seconds, as `t_s`."
+                    " `{times}` seems to hold times as text: without times every row is a pose at rest. Write them in seconds, as `t_s`, or as dates with the year first (`2024-05-01T12:00:00.123Z`)."
+                );
+            }
+            if let Some((whole, part)) = parts {
+                text += &format!(
+                    " `{whole}` and `{part}` are the parts of one time: without times every row is a pose at rest. Write their sum in seconds, as `t_s`."
                 );
             }
             text

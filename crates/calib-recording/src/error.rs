@@ -159,6 +159,20 @@ pub enum Problem {
         /// What should be.
         expected: String,
     },
+    /// A text where a time is expected.
+    #[error("found `{found}`, which is no time that can be read")]
+    TimeText {
+        /// What stands there.
+        found: String,
+    },
+    /// A time that other rows state otherwise.
+    #[error("found `{found}`, and the rows before have {before}")]
+    OtherTime {
+        /// What stands there.
+        found: String,
+        /// How the times of the rows before are written.
+        before: &'static str,
+    },
     /// Infinity.
     #[error("found `{found}`: not finite")]
     NotFinite {

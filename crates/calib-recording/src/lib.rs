@@ -25,6 +25,7 @@
 //! checked by `calib-checks`.
 
 mod column_map;
+mod date_time;
 mod encoding;
 mod error;
 mod growth;
@@ -40,6 +41,7 @@ mod text;
 mod units;
 
 pub use column_map::{BodyColumns, ColumnMap, Delimiter, LongColumns, PRESETS, TimeColumn};
+pub use date_time::{DateTime, date_time};
 pub use encoding::utf8;
 pub use error::{Against, At, Error, Problem};
 pub use map_fault::{MapFault, StatedUnits};

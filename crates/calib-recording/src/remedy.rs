@@ -59,6 +59,10 @@ impl Problem {
             Problem::Unexpected { .. } | Problem::Misfit { .. } => {
                 "export the recording again, or correct it there"
             }
+            Problem::TimeText { .. } => {
+                "write seconds, or a date with the year first (`2024-05-01T12:00:00.123Z`); a time of day needs its date"
+            }
+            Problem::OtherTime { .. } => "write the times of all rows in one way",
             Problem::NotFinite { .. } => "leave the cell empty where nothing was measured",
             Problem::PartlyLost { .. } => "leave all empty when it was lost",
             Problem::TimeBackwards { .. } => "sort the rows by time",

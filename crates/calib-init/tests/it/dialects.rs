@@ -3,11 +3,18 @@
 use calib_init::mistake::Mistake;
 use calib_init::{About, File, Proposal, write};
 use calib_recording::LengthUnit;
+use calib_sim::Motion;
 
 use crate::lab::{
-    Design, Kind, arm, file, link_of, proposed, recordings, text, with_cells, with_names,
+    Design, Kind, arm, file, link_of, proposed, recordings, request, streams, text, with_cells,
+    with_names,
 };
 
+/// The robot stops again and again.
+const HOLDS: Motion = Motion::StopAndGo {
+    hold: 1.6,
+    travel: 1.2,
+};
 const HAND: [(&str, &str, Kind); 1] = [("hand", "flange", Kind::Markers(4))];
 
 /// The names of a table without their units, and a row of these units; places in millimeters.
@@ -150,5 +157,161 @@ fn quaternions_in_another_order_than_their_names_are_listed_in_the_map() {
     assert!(
         profile.contains("quaternion_wxyz: [hand.qx, hand.qy, hand.qz, hand.qw]"),
         "{profile}"
+    );
+}
+
+/// Tracker and robot with clocks that start at different times of a day, as dates.
+fn dated(table: &str, start: f64, zone: &str) -> String {
+    let table = with_names(table, |name| match name {
+        "t_s" => "timestamp".to_owned(),
+        other => other.to_owned(),
+    });
+    with_cells(&table, |column, cell| {
+        if column != "timestamp" {
+            return cell.to_owned();
+        }
+        let t = start + cell.parse::<f64>().expect("a time");
+        let (minutes, seconds) = ((t / 60.0).floor(), t.rem_euclid(60.0));
+        format!(
+            "2024-05-01T{:02}:{:02}:{seconds:09.6}{zone}",
+            (minutes / 60.0).floor(),
+            minutes % 60.0
+        )
+    })
+}
+
+#[test]
+fn dates_of_two_files_are_times_of_one_clock() {
+    let two = streams(&HAND, HOLDS, 1.7, 84);
+    for (robot_starts, zone) in [(12.0 * 3600.0, "Z"), (14.0 * 3600.0, "+02:00")] {
+        let given = [
+            file(
+                "run_tracker",
+                dated(&text(&two.tracker), 12.0 * 3600.0, "Z"),
+            ),
+            file("run_robot", dated(&text(&two.robot), robot_starts, zone)),
+        ];
+        let proposal = proposed(&given);
+        assert_eq!(proposal.recordings.len(), 1);
+        assert!(proposal.recordings[0].stream.is_some() && proposal.recordings[0].log.is_some());
+        is_right(&proposal, zone);
+        assert!(
+            !proposal
+                .facts
+                .iter()
+                .any(|f| matches!(f.about, About::FarClocks { .. })),
+            "{zone}"
+        );
+    }
+}
+
+#[test]
+fn rostopic_names_its_joints_in_cells() {
+    let two = streams(&HAND, HOLDS, 1.7, 85);
+    let robot = text(&two.robot);
+    let rows: Vec<Vec<&str>> = robot
+        .lines()
+        .filter(|line| !line.starts_with('#'))
+        .map(|line| line.split(',').collect())
+        .collect();
+    let place = |name: &str| rows[0].iter().position(|n| *n == name).expect("a column");
+    // The message has the joints in another order, and one that the robot does not have.
+    let order = [4, 2, 6, 1, 5, 3];
+    let mut table = String::from("%time,field.header.stamp,field.name0");
+    (1..=6).for_each(|k| table += &format!(",field.name{k}"));
+    (0..=6).for_each(|k| table += &format!(",field.position{k}"));
+    (0..=6).for_each(|k| table += &format!(",field.velocity{k}"));
+    for row in &rows[1..] {
+        let t: f64 = row[place("t_s")].parse().expect("a time");
+        let ns = 1_714_564_800_000_000_000_i64 + (t * 1e9) as i64;
+        table += &format!("\n{},{ns},gripper", ns + 3_000_000_000);
+        order.iter().for_each(|j| table += &format!(",joint_{j}"));
+        table += ",0.01";
+        for j in order {
+            let degrees: f64 = row[place(&format!("joint_{j}_deg"))]
+                .parse()
+                .expect("an angle");
+            table += &format!(",{}", degrees.to_radians());
+        }
+        table += &",0".repeat(7);
+    }
+    table.push('\n');
+    let proposal = proposed(&[
+        file("run_tracker", text(&two.tracker)),
+        file("run_robot", table),
+    ]);
+    is_right(&proposal, "rostopic");
+    assert!(corrected(&proposal).is_empty(), "{:?}", proposal.facts);
+    let profile = write::profile(&arm(), &proposal);
+    assert!(profile.contains("joint_4: field.position1"), "{profile}");
+    assert!(
+        profile.contains("time: {column: field.header.stamp, unit: ns}"),
+        "{profile}"
+    );
+}
+
+#[test]
+fn times_that_are_not_read_are_said_with_what_to_do() {
+    let two = streams(&HAND, HOLDS, 0.0, 86);
+    let tracker = text(&two.tracker);
+    let said = |table: String| {
+        let proposal = calib_init::propose(
+            &arm(),
+            &request(),
+            &[file("run", table), file("log", text(&two.robot))],
+        );
+        match proposal {
+            Ok(proposal) => write::profile(&arm(), &proposal),
+            Err(error) => error.to_string(),
+        }
+    };
+    let names = |name: &str| match name {
+        "t_s" => "stamp.sec,stamp.nanosec".to_owned(),
+        other => other.to_owned(),
+    };
+    let parts = with_cells(&tracker, |column, cell| match column {
+        "t_s" => {
+            let t: f64 = cell.parse().expect("a time");
+            format!("{},{}", t.floor(), (t.fract() * 1e9).round())
+        }
+        _ => cell.to_owned(),
+    });
+    // Two files of different length need times; rows of the same number are paired, and the columns marked.
+    let message = said(with_names(&parts, names));
+    assert!(
+        message.contains("its times are not read (`stamp.sec`, `stamp.nanosec`)"),
+        "{message}"
+    );
+    let clock = with_cells(&tracker, |column, cell| match column {
+        "t_s" => {
+            let t: f64 = cell.parse().expect("a time");
+            format!("01.05.2024 12:{:02}:{:06.3}", (t / 60.0).floor(), t % 60.0)
+        }
+        _ => cell.to_owned(),
+    });
+    let message = said(with_names(&clock, |name| name.replace("t_s", "zeit")));
+    assert!(
+        message.contains("its times are not read (`zeit`)"),
+        "{message}"
+    );
+    let good = recordings(&HAND, Design::Random, 87);
+    let mut row = 0;
+    let poses = with_cells(&text(&good["poses"]), |column, cell| match column {
+        "pose" => {
+            row += 1;
+            format!("{row},5")
+        }
+        _ => cell.to_owned(),
+    });
+    let poses = with_names(&poses, |name| {
+        name.replace("pose", "stamp.sec,stamp.nanosec")
+    });
+    let proposal = proposed(&[file("poses", poses)]);
+    let profile = write::profile(&arm(), &proposal);
+    assert!(profile.contains("are the parts of one time"), "{profile}");
+    assert!(
+        proposal
+            .to_check()
+            .any(|f| matches!(f.about, About::Ignored { .. }))
     );
 }

@@ -4,6 +4,7 @@ use super::header::{Known, Layout};
 use super::rows::Rows;
 use super::unit_row;
 use crate::column_map::ColumnMap;
+use crate::date_time::date_time;
 use crate::error::{At, Placed, Problem};
 use crate::model::Recording;
 use crate::text::{Lines, Separator, cells, is_blank, stated_separator, unquoted};
@@ -34,8 +35,10 @@ pub(crate) fn read_table(
     };
     if units.is_some() {
         first.pop();
+        first.extend(first_row(&mut lines, separator)?);
     }
-    let layout = Layout::new(number, names, units.as_ref(), (map, known))?;
+    let dates = dates(first.last(), separator);
+    let layout = Layout::new(number, names, (units.as_ref(), &dates), (map, known))?;
     let mut body = Body {
         live: comments.iter().any(|comment| comment == WRITTEN_LIVE),
         rows: Rows::new(layout, separator, map),
@@ -64,6 +67,15 @@ pub(crate) fn read_table(
     );
     recording.meta.comments = body.comments;
     Ok(recording)
+}
+
+/// Which columns of the first row hold a date with a time of day.
+fn dates(first: Option<&Line>, separator: Separator) -> Vec<bool> {
+    let of = |(_, line, _): &Line| {
+        let cells = cells(line, separator);
+        cells.map(|cell| date_time(cell).is_some()).collect()
+    };
+    first.map(of).unwrap_or_default()
 }
 
 /// What stands below the header, while it is read.

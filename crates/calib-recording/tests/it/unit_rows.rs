@@ -205,3 +205,77 @@ fn utf_16_is_read_as_the_same_text() {
         )
     );
 }
+
+#[test]
+fn dates_are_times_in_seconds_since_1970() {
+    let seconds = 1_714_564_800.125;
+    for (name, first, second) in [
+        (
+            "t_s",
+            "2024-05-01T12:00:00.125Z",
+            "2024-05-01T12:00:01.125Z",
+        ),
+        (
+            "t_ms",
+            "2024-05-01 14:00:00.125+02:00",
+            "2024-05-01 14:00:01.125+02:00",
+        ),
+        (
+            "Timestamp",
+            "2024/05/01 12:00:00.125",
+            "2024/05/01 12:00:01.125",
+        ),
+        (
+            "rec_time",
+            "2024-05-01T12:00:00,125Z",
+            "2024-05-01T12:00:01,125Z",
+        ),
+    ] {
+        let text = format!("{name};elbow_deg\n{first};1\n{second};2\n");
+        let poses = read(&text, None).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!(
+            poses.t.as_deref(),
+            Some(&[seconds, seconds + 1.0][..]),
+            "{name}"
+        );
+        let map = ColumnMap {
+            time: Some(TimeColumn {
+                column: name.to_owned(),
+                unit: TimeUnit::S,
+            }),
+            ..ColumnMap::default()
+        };
+        let poses = read(&text, Some(map)).unwrap_or_else(|e| panic!("{name}: {e}"));
+        assert_eq!(
+            poses.t.as_deref(),
+            Some(&[seconds, seconds + 1.0][..]),
+            "{name}"
+        );
+    }
+    let units = "time;elbow\n;deg\n2024-05-01T12:00:00.125Z;1\n";
+    assert_eq!(
+        read(units, None).expect("units").t.as_deref(),
+        Some(&[seconds][..])
+    );
+    // Numbers below a date are other times, and the zone is stated always or never.
+    for (second, before) in [
+        ("2024-05-01T12:00:01", "an offset from UTC"),
+        ("01.05.2024 12:00:01", "no time that can be read"),
+        ("12:00:01", "no time that can be read"),
+    ] {
+        let said = refused(
+            format!("t_s,a_deg\n2024-05-01T12:00:00Z,1\n{second},2\n"),
+            None,
+        );
+        assert!(
+            said.contains("log.csv:3: column `t_s`") && said.contains(before),
+            "{said}"
+        );
+    }
+    let said = refused("t_s,a_deg\n0.5,1\n2024-05-01T12:00:00Z,2\n", None);
+    assert!(said.contains("the rows before have numbers"), "{said}");
+    let said = refused("t_s,a_deg\n12:00:00,1\n", None);
+    assert!(said.contains("2024-05-01T12:00:00.123Z"), "{said}");
+    let said = refused("timestamp,a_deg\n1,1\n", None);
+    assert!(said.contains("did you mean `t_s`?"), "{said}");
+}

@@ -11,7 +11,8 @@ pub(crate) use naming::{JOINT, is_canonical, is_text_column, length_unit, reads_
 use crate::column_map::ColumnMap;
 use crate::error::{At, Placed, Problem};
 use crate::model::JointUnit;
-use crate::table::unit_row::UnitRow;
+use crate::table::unit_row::{StatedUnit, UnitRow};
+use crate::units::TimeUnit;
 use std::collections::BTreeMap;
 
 /// What is known of the robot beside a table.
@@ -107,11 +108,11 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// Reads the header, and the row of units below it.
+    /// Reads the header, and the row of units below it. `dates`: the columns that hold dates, as far as they are known.
     pub(super) fn new(
         line: u64,
         names: Vec<String>,
-        units: Option<&UnitRow>,
+        (units, dates): (Option<&UnitRow>, &[bool]),
         (map, known): (Option<&ColumnMap>, Known<'_>),
     ) -> Placed<Layout> {
         let at = || At::Line(line);
@@ -125,7 +126,12 @@ impl Layout {
         if let Some(map) = map {
             mapped::apply(&mut layout, map, &mut mapped).map_err(|problem| (at(), problem))?;
         }
-        let stated = |i: usize| units.and_then(|row| row.units[i]);
+        // A date is a time in seconds, whatever stands in the row of units.
+        let date = |i: usize| dates.get(i) == Some(&true);
+        let stated = |i: usize| match date(i) {
+            true => Some(StatedUnit::Time(TimeUnit::S)),
+            false => units.and_then(|row| row.units[i]),
+        };
         layout
             .by_rules(&mapped, map.is_some(), stated, known)
             .map_err(|problem| (at(), problem))?;

@@ -199,6 +199,9 @@ pub(super) fn nearest_rule(name: &str) -> Option<String> {
     {
         return Some(format!("{head}_{unit}"));
     }
+    if is_time_word(name) {
+        return Some("t_s".to_owned());
+    }
     let fixed = COUNTERS.iter().chain(&LABELS).copied().chain([
         "t_s",
         "t_ms",
@@ -253,10 +256,22 @@ pub(super) fn with_unit(name: &str, unit: Option<StatedUnit>) -> String {
     }
 }
 
-/// Whether a name says no more than that the column holds times.
+/// Whether a name says that the column holds times: `Timestamp`, `time (UTC)`, `rec_time`.
 fn is_time_word(name: &str) -> bool {
-    const WORDS: [&str; 6] = ["t", "time", "timestamp", "stamp", "zeit", "temps"];
-    WORDS.iter().any(|word| name.eq_ignore_ascii_case(word))
+    const WORDS: [&str; 10] = [
+        "t",
+        "time",
+        "timestamp",
+        "stamp",
+        "date",
+        "datetime",
+        "zeit",
+        "zeitstempel",
+        "datum",
+        "temps",
+    ];
+    let mut words = name.split(|c: char| !c.is_alphanumeric());
+    words.any(|one| WORDS.iter().any(|word| one.eq_ignore_ascii_case(word)))
 }
 
 /// Whether a header line reads as one of our own tables (for the detection of formats).
