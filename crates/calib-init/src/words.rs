@@ -267,33 +267,40 @@ fn of_columns(about: &About) -> String {
             let how = if *named { "" } else { ", by its numbers" };
             format!("`{column}` is the time in {unit}{how}.")
         }
-        About::Ignored {
-            columns,
-            orientation,
-            times,
-            parts,
-        } => {
-            let mut text = format!("Not used: {}.", quoted(columns));
-            if !orientation.is_empty() {
-                text += &format!(
-                    " {} seem to be an orientation: without it the body is a point. Write it as a quaternion, `<body>.qx` to `<body>.qw`, or map its columns.",
-                    quoted(orientation)
-                );
-            }
-            if let Some(times) = times {
-                text += &format!(
-                    " `{times}` seems to hold times as text: without times every row is a pose at rest. Write them in seconds, as `t_s`, or as dates with the year first (`2024-05-01T12:00:00.123Z`)."
-                );
-            }
-            if let Some((whole, part)) = parts {
-                text += &format!(
-                    " `{whole}` and `{part}` are the parts of one time: without times every row is a pose at rest. Write their sum in seconds, as `t_s`."
-                );
-            }
-            text
-        }
+        About::Ignored { .. } => ignored(about),
         _ => String::new(),
     }
+}
+
+/// Columns that nothing uses, and what some of them seem to be.
+fn ignored(about: &About) -> String {
+    let About::Ignored {
+        columns,
+        orientation,
+        times,
+        parts,
+    } = about
+    else {
+        return String::new();
+    };
+    let mut text = format!("Not used: {}.", quoted(columns));
+    if !orientation.is_empty() {
+        text += &format!(
+            " {} seem to be an orientation: without it the body is a point. Write it as a quaternion, `<body>.qx` to `<body>.qw`, or map its columns.",
+            quoted(orientation)
+        );
+    }
+    if let Some(times) = times {
+        text += &format!(
+            " `{times}` seems to hold times as text: without times every row is a pose at rest. Write them in seconds, as `t_s`, or as dates with the year first (`2024-05-01T12:00:00.123Z`)."
+        );
+    }
+    if let Some((whole, part)) = parts {
+        text += &format!(
+            " `{whole}` and `{part}` are the parts of one time: without times every row is a pose at rest. Write their sum in seconds, as `t_s`."
+        );
+    }
+    text
 }
 
 fn of_session(about: &About) -> String {

@@ -71,6 +71,14 @@ fn of_joint<'n>(column: &'n str, joints: &[&str]) -> Option<Meaning<'n>> {
     })
 }
 
+fn unknown(name: &str) -> Problem {
+    Problem::UnknownColumn {
+        name: name.to_owned(),
+        expected: EXPECTED.to_owned(),
+        nearest: nearest_rule(name),
+    }
+}
+
 impl Layout {
     /// The columns that are not mapped, by our rules; `lenient`: unknown ones are ignored. `stated`: the unit that a row of units gives a column.
     pub(super) fn by_rules(
@@ -144,16 +152,11 @@ impl Layout {
                 | Meaning::Unknown => {
                     // A speed or a current is not read, and says so.
                     let other = stated(i) == Some(StatedUnit::Other);
+                    let own = &self.names[i];
                     if !lenient && !other && !name.is_empty() {
-                        return Err(Problem::UnknownColumn {
-                            name: self.names[i].clone(),
-                            expected: EXPECTED.to_string(),
-                            nearest: nearest_rule(&self.names[i]),
-                        });
+                        return Err(unknown(own));
                     }
-                    if !name.is_empty() {
-                        ignored.push(self.names[i].clone());
-                    }
+                    ignored.extend((!name.is_empty()).then(|| own.clone()));
                 }
             }
         }
