@@ -346,6 +346,10 @@ fn renamed(source: &Source, map: &ColumnMap, columns: &[String], unit: &str) -> 
         (false, true) => format!("{}_{}", name::unit(name).stem, map.lengths.name()),
         (false, false) => name.clone(),
     };
+    // A name that states the unit already corrects nothing: the values are wrong.
+    if columns.iter().any(|column| new(column) == *column) {
+        return None;
+    }
     rename(&mut renamed, &table, new);
     Some(renamed)
 }

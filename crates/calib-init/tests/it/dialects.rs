@@ -315,3 +315,29 @@ fn times_that_are_not_read_are_said_with_what_to_do() {
             .any(|f| matches!(f.about, About::Ignored { .. }))
     );
 }
+
+#[test]
+fn a_column_that_states_its_unit_is_not_corrected_by_another_name() {
+    let good = recordings(&HAND, Design::Random, 88);
+    let twice = |column: &str, cell: &str| match (column, cell.parse::<f64>()) {
+        ("joint_3_deg", Ok(degrees)) => degrees.to_degrees().to_string(),
+        _ => cell.to_owned(),
+    };
+    let files: Vec<File> = good
+        .iter()
+        .map(|(name, poses)| file(name, with_cells(&text(poses), twice)))
+        .collect();
+    let proposal = proposed(&files);
+    let unit = Mistake::Unit {
+        joint: Some("joint_3".to_owned()),
+        unit: "deg",
+    };
+    let is_said =
+        |about: &About| matches!(about, About::NotCorrected { mistake, .. } if *mistake == unit);
+    assert!(
+        proposal.facts.iter().any(|f| is_said(&f.about)),
+        "{:?}",
+        proposal.facts
+    );
+    assert!(corrected(&proposal).is_empty());
+}

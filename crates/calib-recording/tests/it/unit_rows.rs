@@ -278,4 +278,6 @@ fn dates_are_times_in_seconds_since_1970() {
     assert!(said.contains("2024-05-01T12:00:00.123Z"), "{said}");
     let said = refused("timestamp,a_deg\n1,1\n", None);
     assert!(said.contains("did you mean `t_s`?"), "{said}");
+    let said = refused("stamp.sec,stamp.nanosec,a_deg\n1,5,1\n", None);
+    assert!(!said.contains("did you mean"), "{said}");
 }

@@ -200,7 +200,10 @@ pub(super) fn nearest_rule(name: &str) -> Option<String> {
         return Some(format!("{head}_{unit}"));
     }
     if is_time_word(name) {
-        return Some("t_s".to_owned());
+        // Whole seconds beside the parts of a second are no time alone.
+        let mut words = name.split(|c: char| !c.is_alphanumeric());
+        let parts = words.any(|w| matches!(w, "sec" | "secs" | "nsec" | "nsecs" | "nanosec"));
+        return (!parts).then(|| "t_s".to_owned());
     }
     let fixed = COUNTERS.iter().chain(&LABELS).copied().chain([
         "t_s",
