@@ -33,11 +33,14 @@ pub(super) fn with_remedy(
         let all = layout.recordings.iter();
         all.filter(|recording| names.contains(&recording.name.as_str()))
     };
-    let mut columns = joints().flat_map(|joint| {
+    let columns = joints().flat_map(|joint| {
         let name = layout.joint(joint);
         recordings().filter_map(move |recording| recording.meta.joint_columns.get(name))
     });
-    match columns.next() {
+    let columns: Vec<&JointColumn> = columns.collect();
+    // Of all columns one that another name mends, where there is one.
+    let renamed = columns.iter().find(|c| remedy(c, mistake) != Remedy::Twice);
+    match renamed.or(columns.first()) {
         Some(column) => match remedy(column, mistake) {
             Remedy::Rename(name) => finding
                 .with("column", Fact::name(&column.name))
