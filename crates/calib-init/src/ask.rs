@@ -452,7 +452,7 @@ pub fn apply_one(
     let mut inside = recordings.filter(|(r, _)| scoped.scope.contains(RecordingIndex(*r)));
     let source = inside.next().map(|(_, draft)| &sources[draft.source]);
     let mistake = correct::mistake(model, source, bodies, &scoped.hypothesis);
-    let done = correct::corrected(model, sources, drafts, scoped)?;
+    let done = correct::corrected(model, sources, drafts, bodies, scoped)?;
     let about = match &done {
         Some(_) => About::Corrected {
             mistake,

@@ -58,6 +58,7 @@ pub fn guess(model: &RobotModel, header: &Header) -> Guess {
         guess.facts.push(About::Ignored {
             orientation: unread::orientation(header, &ignored),
             times: time.then(|| unread::times(header, &ignored)).flatten(),
+            parts: time.then(|| unread::parts(header)).flatten(),
             columns: ignored,
         });
     }
@@ -90,7 +91,8 @@ fn time(header: &Header, guess: &mut Guess, used: &mut BTreeSet<usize>) {
     else {
         return;
     };
-    let stated = match name::unit(&header.names[i]).unit {
+    let stated = match header.unit(i).unit {
+        _ if header.dates[i] => Some(TimeUnit::S),
         Some(NamedUnit::Time(unit)) => Some(unit),
         _ => None,
     };
@@ -152,7 +154,7 @@ fn like_coordinates(model: &RobotModel, header: &Header) -> (BTreeSet<usize>, BT
     let of_joint = |i: &usize| {
         let column = &header.names[*i];
         let mut joints = model.independent_joints();
-        joints.any(|j| model.joint(j).name == stem_of(column) && fits(model, j, column))
+        joints.any(|j| model.joint(j).name == stem_of(column) && fits(model, j, header, *i))
     };
     let all = (0..header.names.len()).filter(of_joint);
     all.partition(|i| header.names[*i].starts_with(JOINT))
@@ -168,8 +170,8 @@ fn tracked(
     let (mut places, mut turns) = (Groups::new(), Groups::new());
     let free = |i: &usize| !used.contains(i) && !joints.contains(i) && header.has_numbers(*i);
     for i in (0..header.names.len()).filter(free) {
-        let unit = name::unit(&header.names[i]);
-        if matches!(unit.unit, Some(NamedUnit::Angle(_) | NamedUnit::Time(_))) {
+        let unit = header.unit(i);
+        if !matches!(unit.unit, None | Some(NamedUnit::Length(_))) {
             continue;
         }
         for (k, letter) in ['x', 'y', 'z', 'w'].into_iter().enumerate() {
@@ -218,14 +220,14 @@ fn tracked(
 /// Columns of joints.
 fn joints(model: &RobotModel, header: &Header, guess: &mut Guess, used: &mut BTreeSet<usize>) {
     let free = |used: &BTreeSet<usize>, i: &usize| !used.contains(i) && header.has_numbers(*i);
-    let mut found: BTreeMap<JointId, usize> = BTreeMap::new();
+    let mut found = by_texts(model, header, used);
     let stem = |i: usize| stem_of(&header.names[i]);
-    for joint in model.independent_joints() {
+    let mut unnamed: Vec<JointId> = model.independent_joints().collect();
+    unnamed.retain(|joint| !found.contains_key(joint));
+    for joint in unnamed {
         let wanted = &model.joint(joint).name;
         let columns = (0..header.names.len()).filter(|i| free(used, i));
-        let columns: Vec<usize> = columns
-            .filter(|i| fits(model, joint, &header.names[*i]))
-            .collect();
+        let columns: Vec<usize> = columns.filter(|i| fits(model, joint, header, *i)).collect();
         // The joint's own name, else its words.
         let exact = columns
             .iter()
@@ -292,16 +294,48 @@ fn joints(model: &RobotModel, header: &Header, guess: &mut Guess, used: &mut BTr
     }
 }
 
-/// The unit in a column's name does not speak against the joint.
-fn fits(model: &RobotModel, joint: JointId, column: &str) -> bool {
-    // A joint may have a unit's word in its own name.
-    if model.joint(joint).name == column {
-        return true;
+/// Joints whose names stand in the cells of a column beside each: `field.name0` and `field.position0` of `rostopic echo -p`. The columns of positions
+/// are used, also where a name is that of no joint or changes from row to row: their order says nothing.
+fn by_texts(
+    model: &RobotModel,
+    header: &Header,
+    used: &mut BTreeSet<usize>,
+) -> BTreeMap<JointId, usize> {
+    let mut found = BTreeMap::new();
+    for (i, name) in header.names.iter().enumerate() {
+        let Some((before, number, "")) = name::numbered(name) else {
+            continue;
+        };
+        let Some(position) = before
+            .strip_suffix("name")
+            .and_then(|of| header.position(&format!("{of}position{number}")))
+            .filter(|_| !header.has_numbers(i))
+        else {
+            continue;
+        };
+        used.insert(position);
+        let mut joints = model.independent_joints();
+        let text = header.texts[i].as_ref();
+        if let Some(joint) = joints.find(|j| Some(&model.joint(*j).name) == text) {
+            used.insert(i);
+            found.insert(joint, position);
+        }
     }
-    match name::unit(column).unit {
+    found
+}
+
+/// The unit of a column, in its name or in a row of units, does not speak against the joint.
+fn fits(model: &RobotModel, joint: JointId, header: &Header, column: usize) -> bool {
+    let in_row = header.units.get(column).copied().flatten();
+    // A joint may have a unit's word in its own name.
+    let unit = match model.joint(joint).name == header.names[column] {
+        true => in_row.map(NamedUnit::from),
+        false => header.unit(column).unit,
+    };
+    match unit {
         Some(NamedUnit::Angle(_)) => model.joint(joint).kind.turns(),
         Some(NamedUnit::Length(_)) => !model.joint(joint).kind.turns(),
-        Some(NamedUnit::Time(_)) => false,
+        Some(NamedUnit::Time(_) | NamedUnit::Other) => false,
         None => true,
     }
 }
@@ -361,7 +395,7 @@ fn family(
         let agrees = chain
             .iter()
             .zip(&members)
-            .all(|(joint, (_, i))| fits(model, *joint, &header.names[*i]));
+            .all(|(joint, (_, i))| fits(model, *joint, header, *i));
         let better = best
             .as_ref()
             .is_none_or(|(was_whole, count, _)| (whole, members.len()) > (*was_whole, *count));
@@ -383,7 +417,7 @@ fn family(
     let left: Vec<usize> = left.collect();
     if let ([joint], [column]) = (&rest[..], &left[..])
         && !turns(joint)
-        && fits(model, *joint, &header.names[*column])
+        && fits(model, *joint, header, *column)
     {
         pairs.insert(*joint, *column);
     }
@@ -398,12 +432,9 @@ fn angles(model: &RobotModel, header: &Header, guess: &mut Guess) {
         .filter(|(j, _)| model.joint(*j).kind.turns());
     let units: Vec<(Option<NamedUnit>, bool, f64)> = turning
         .filter_map(|(_, column)| {
-            let unit = name::unit(column);
-            Some((
-                unit.unit,
-                unit.native,
-                header.largest(header.position(column)?),
-            ))
+            let i = header.position(column)?;
+            let unit = header.unit(i);
+            Some((unit.unit, unit.native, header.largest(i)))
         })
         .collect();
     if units.is_empty() {
@@ -435,10 +466,7 @@ fn lengths(model: &RobotModel, header: &Header, guess: &mut Guess) {
     if columns.is_empty() {
         return;
     }
-    let units: Vec<_> = columns
-        .iter()
-        .map(|i| name::unit(&header.names[*i]))
-        .collect();
+    let units: Vec<_> = columns.iter().map(|i| header.unit(*i)).collect();
     let named = units.iter().find_map(|u| match u.unit {
         Some(NamedUnit::Length(unit)) => Some(unit),
         _ => None,

@@ -61,9 +61,8 @@ pub fn computed(
             body: one.name.clone(),
             columns: columns(&one.markers),
             markers: one.markers.clone(),
-            rms: own,
+            rms: [own, next],
             other: scene.bodies[other].name.clone(),
-            next,
         };
         (own < BELOW * next).then(|| (body, Fact::new(Place::Recordings, about)))
     });

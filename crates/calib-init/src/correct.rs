@@ -1,15 +1,16 @@
 //! Mistakes in tables, corrected in the profile: columns exchanged, negated, or read in another unit. The tables themselves are never changed.
 
 use calib_checks::structural::{
-    BodyIndex, Chain, ColumnOrder, Hypothesis, Length, Scoped, UnitMistake,
+    BodyIndex, Chain, ColumnOrder, Hypothesis, Length, PoseMistake, Scoped, UnitMistake,
 };
 use calib_recording::{AngleUnit, ColumnMap, LengthUnit};
 use calib_urdf::{JointKind, RobotModel, doubt};
 
 use crate::error::InitError;
-use crate::header::header;
+use crate::header::{Header, header};
 use crate::mistake::Mistake;
 use crate::name::{self, NamedUnit, Unit};
+use crate::quaternions;
 use crate::session::Draft;
 use crate::source::Source;
 
@@ -65,7 +66,11 @@ pub fn mistake(
         Hypothesis::Mirrored => Mistake::Mirrored,
         Hypothesis::TrackerMoved | Hypothesis::TrackerAxes { .. } => Mistake::TrackerMoved,
         Hypothesis::Remounted { body } => Mistake::Remounted { body: named(body) },
-        Hypothesis::Poses { .. } => Mistake::Poses,
+        Hypothesis::Poses { mistake, .. } => match mistake {
+            PoseMistake::ScalarFirstReadAsLast => Mistake::Quaternions { first: true },
+            PoseMistake::ScalarLastReadAsFirst => Mistake::Quaternions { first: false },
+            _ => Mistake::Poses,
+        },
         Hypothesis::MissingColumn { joint: j } => Mistake::MissingColumn { joint: joint(j) },
         Hypothesis::StoodAt { joint: j, value } => Mistake::StoodAt {
             joint: joint(j),
@@ -112,7 +117,7 @@ fn really(mistake: UnitMistake) -> &'static str {
     }
 }
 
-/// The sources with a mistake corrected in their column maps; `None` where no map corrects it.
+/// The sources with a mistake corrected in their column maps; `None` where no map corrects it. `bodies`: their names in the profile.
 ///
 /// # Errors
 /// [`InitError::Recording`] where a file cannot be read by its new map.
@@ -120,6 +125,7 @@ pub fn corrected(
     model: &RobotModel,
     sources: &[Source],
     drafts: &[Draft],
+    bodies: &[String],
     scoped: &Scoped,
 ) -> Result<Option<Vec<Source>>, InitError> {
     let mut new = sources.to_vec();
@@ -130,12 +136,32 @@ pub fn corrected(
         {
             continue;
         }
-        let of_tracker = matches!(scoped.hypothesis, Hypothesis::TrackerUnit { .. });
+        let of_tracker = matches!(
+            scoped.hypothesis,
+            Hypothesis::TrackerUnit { .. } | Hypothesis::Poses { .. }
+        );
         let at = match draft.log {
             Some(log) if !of_tracker => log,
             _ => draft.source,
         };
-        let Some(map) = new_map(model, &sources[at], &scoped.hypothesis) else {
+        let map = match scoped.hypothesis {
+            Hypothesis::Poses { body, mistake } => {
+                let one = body.and_then(|b| bodies.get(b.0));
+                let names = sources[at]
+                    .recording
+                    .bodies
+                    .iter()
+                    .map(|stream| &stream.name);
+                let names: Vec<&String> =
+                    names.filter(|n| one.is_none_or(|one| one == *n)).collect();
+                if names.is_empty() {
+                    continue;
+                }
+                quaternions::reordered(model, &sources[at], &names, mistake)
+            }
+            _ => new_map(model, &sources[at], &scoped.hypothesis),
+        };
+        let Some(map) = map else {
             return Ok(None);
         };
         new[at] = sources[at].with_columns(model, map)?;
@@ -146,6 +172,14 @@ pub fn corrected(
 fn new_map(model: &RobotModel, source: &Source, hypothesis: &Hypothesis) -> Option<ColumnMap> {
     let joint = |j: calib_checks::structural::JointIndex| model.joints()[j.0].name.clone();
     let mut map = source.columns.clone().unwrap_or_default();
+    let of_unit = matches!(
+        hypothesis,
+        Hypothesis::Unit { .. } | Hypothesis::Units { .. } | Hypothesis::TrackerUnit { .. }
+    );
+    let has_units = |table: Header| table.units.iter().any(Option::is_some);
+    if of_unit && map.names.is_empty() && header(&source.file.bytes).is_some_and(has_units) {
+        map = without_unit_row(source, &map)?;
+    }
     match *hypothesis {
         Hypothesis::Sign { joint: j } => {
             let name = joint(j);
@@ -247,6 +281,7 @@ fn scaled(was: LengthUnit, unit: Length, read_as: Length) -> Option<LengthUnit> 
 #[must_use]
 pub fn lengths_of(source: &Source) -> Option<LengthUnit> {
     let map = source.columns.clone().unwrap_or_default();
+    let map = without_unit_row(source, &map).unwrap_or(map);
     let columns = places(source, &map);
     let unit = |column: &String| match name::unit(column) {
         Unit {
@@ -277,7 +312,12 @@ fn places(source: &Source, map: &ColumnMap) -> Vec<String> {
                 .count()
                 > 0
     };
-    for name in header(&source.file.bytes).map_or_else(Vec::new, |table| table.names) {
+    let of_file = || header(&source.file.bytes).map_or_else(Vec::new, |table| table.names);
+    let names = match map.names.is_empty() {
+        true => of_file(),
+        false => map.names.clone(),
+    };
+    for name in names {
         if is_place(&name) && !columns.contains(&name) {
             columns.push(name);
         }
@@ -306,33 +346,64 @@ fn renamed(source: &Source, map: &ColumnMap, columns: &[String], unit: &str) -> 
         (false, true) => format!("{}_{}", name::unit(name).stem, map.lengths.name()),
         (false, false) => name.clone(),
     };
-    let names = if map.names.is_empty() {
-        &table.names
-    } else {
-        &map.names
-    };
-    renamed.names = names.iter().map(new).collect();
-    renamed.skip_lines = table.line;
-    renamed.delimiter = Some(table.delimiter);
-    let (bare, moved): (Vec<_>, Vec<_>) = map
-        .joint_columns
-        .iter()
-        .cloned()
-        .partition(|column| !columns.contains(column));
-    renamed.joint_columns = bare;
-    renamed
-        .joints
+    // A name that states the unit already corrects nothing: the values are wrong.
+    if columns.iter().any(|column| new(column) == *column) {
+        return None;
+    }
+    rename(&mut renamed, &table, new);
+    Some(renamed)
+}
+
+/// Gives the columns of a map and of the file new names; the header line of the file is not read any more.
+fn rename(map: &mut ColumnMap, table: &Header, new: impl Fn(&String) -> String) {
+    if map.names.is_empty() {
+        map.names = table.names.clone();
+    }
+    map.names = map.names.iter().map(&new).collect();
+    map.skip_lines = table.line;
+    map.delimiter = Some(table.delimiter);
+    let all = std::mem::take(&mut map.joint_columns).into_iter();
+    let (bare, moved): (Vec<_>, Vec<_>) = all.partition(|column| new(column) == *column);
+    map.joint_columns = bare;
+    map.joints
         .extend(moved.into_iter().map(|name| (name.clone(), name)));
-    let joints = renamed
-        .joints
-        .values_mut()
-        .chain(renamed.prismatic.values_mut());
-    let markers = renamed.markers.values_mut().flatten();
-    let bodies = renamed.bodies.values_mut().flat_map(|b| &mut b.position);
-    for column in joints.chain(markers).chain(bodies) {
+    let joints = map.joints.values_mut().chain(map.prismatic.values_mut());
+    let markers = map.markers.values_mut().flatten();
+    let bodies = map.bodies.values_mut().flat_map(|b| &mut b.position);
+    let time = map.time.iter_mut().map(|time| &mut time.column);
+    for column in joints.chain(markers).chain(bodies).chain(time) {
         *column = new(column);
     }
-    Some(renamed)
+}
+
+/// The map with names that state the units of a row of units, which is not read any more; `None` where the file has none.
+fn without_unit_row(source: &Source, map: &ColumnMap) -> Option<ColumnMap> {
+    let table = header(&source.file.bytes)?;
+    if !table.units.iter().any(Option::is_some) || !map.names.is_empty() || map.decimal_comma {
+        return None;
+    }
+    let new = |name: &String| {
+        let i = table.position(name);
+        let unit = i.and_then(|i| table.unit(i).unit.map(|unit| (unit, i)));
+        match unit {
+            Some((NamedUnit::Angle(_) | NamedUnit::Length(_), i))
+                if name::unit(name).unit.is_none() =>
+            {
+                let unit = table.unit(i).unit.map_or("", NamedUnit::name);
+                format!("{name}_{unit}")
+            }
+            _ => name.clone(),
+        }
+    };
+    let mut spelled = map.clone();
+    if let Some(time) = &mut spelled.time
+        && let Some(i) = table.position(&time.column)
+        && let Some(NamedUnit::Time(unit)) = table.unit(i).unit
+    {
+        time.unit = unit;
+    }
+    rename(&mut spelled, &table, new);
+    Some(spelled)
 }
 
 /// The column of a joint in a file.

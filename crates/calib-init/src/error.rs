@@ -219,6 +219,17 @@ pub enum InitError {
         /// Rows of both.
         rows: (usize, usize),
     },
+    /// Two files that cannot be brought together because the times of one are not read.
+    #[error(
+        "{file}: its times are not read ({}), and its rows are not those of the other file\n  help: write them as one column `t_s` in seconds, or as dates with the year first (`2024-05-01T12:00:00.123Z`)",
+        listed(.columns)
+    )]
+    TimesNotRead {
+        /// The file.
+        file: String,
+        /// The columns that seem to hold times.
+        columns: Vec<String>,
+    },
     /// The text of an edited profile has no place for what is to be added: its section is an alias, or written in an unusual way.
     #[error(
         "{file}: the text of `{section}` cannot be changed without changing something else (an alias, an anchor that others use, or an unusual style), so that nothing was written\n  help: write `{section}` out, then add there:\n{}", .lines.join("\n")

@@ -218,6 +218,8 @@ pub enum About {
         orientation: Vec<String>,
         /// The one that seems to hold times as text.
         times: Option<String>,
+        /// Those that hold whole seconds and the parts of a second.
+        parts: Option<(String, String)>,
     },
     /// A marker that repeats another one in every row: left out.
     Duplicate {
@@ -234,12 +236,10 @@ pub enum About {
         markers: Vec<String>,
         /// The columns of the markers.
         columns: Vec<String>,
-        /// Its residual, rms, m.
-        rms: f64,
         /// The body that fits worst.
         other: String,
-        /// Its residual, rms, m.
-        next: f64,
+        /// Residuals of the two, rms, m.
+        rms: [f64; 2],
     },
     /// Markers that are seen in too few rows: left out.
     Seldom {

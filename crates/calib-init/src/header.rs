@@ -1,6 +1,8 @@
 //! The header of a delimited table, and the first of its numbers.
 
-use calib_recording::Delimiter;
+use calib_recording::{Delimiter, StatedUnit, date_time, stated_separator, unit_row, utf8};
+
+use crate::name::{self, NamedUnit, Unit};
 
 /// Rows that are looked at.
 const ROWS: usize = 400;
@@ -14,10 +16,16 @@ pub struct Header {
     pub names: Vec<String>,
     /// `[column][row]`: the first rows; `None` where a cell is not a number.
     pub columns: Vec<Vec<Option<f64>>>,
+    /// Columns whose numbers are dates with a time of day, in seconds since 1970.
+    pub dates: Vec<bool>,
+    /// The one text of a column, where it is the same in all rows.
+    pub texts: Vec<Option<String>>,
     /// Numbers are written `1,5`.
     pub decimal_comma: bool,
-    /// The line of the header, from 1.
+    /// The last line above the numbers, from 1: the header, or the row of units below it.
     pub line: u64,
+    /// Units from a row below the header; empty without such a row.
+    pub units: Vec<Option<StatedUnit>>,
     /// What separates the cells.
     pub delimiter: Delimiter,
 }
@@ -45,6 +53,21 @@ impl Header {
         self.columns[column].iter().any(Option::is_some)
     }
 
+    /// The unit of a column: of its name, else of the row of units.
+    #[must_use]
+    pub fn unit(&self, column: usize) -> Unit<'_> {
+        let named = name::unit(&self.names[column]);
+        let row = self.units.get(column).copied().flatten();
+        match row {
+            Some(unit) if named.unit.is_none() => Unit {
+                stem: &self.names[column],
+                unit: Some(NamedUnit::from(unit)),
+                native: true,
+            },
+            _ => named,
+        }
+    }
+
     /// The place of a column.
     #[must_use]
     pub fn position(&self, name: &str) -> Option<usize> {
@@ -52,11 +75,11 @@ impl Header {
     }
 }
 
-/// Reads the header line (the first that is neither blank nor a comment) and the first rows; `None` where there is no such table.
+/// Reads the header line (the first that is neither blank nor a comment nor states the separator), the row of units below it, and the first rows;
+/// `None` where there is no such table.
 #[must_use]
 pub fn header(bytes: &[u8]) -> Option<Header> {
-    let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let bytes = &bytes[..bytes.len().min(BYTES)];
+    let bytes = &utf8(&bytes[..bytes.len().min(BYTES)]).ok()?[..];
     if bytes.contains(&0) {
         return None;
     }
@@ -68,35 +91,69 @@ pub fn header(bytes: &[u8]) -> Option<Header> {
         .lines()
         .enumerate()
         .filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
-    let (above, first) = lines.next()?;
-    let separator = separator(first);
+    let (mut above, mut first) = lines.next()?;
+    let stated = stated_separator(first).filter(|_| above == 0);
+    if stated.is_some() {
+        (above, first) = lines.next()?;
+    }
+    let separator = match stated {
+        Some(stated) => of_delimiter(stated.ok()?),
+        None => separator(first),
+    };
     let names: Vec<String> = cells(first, separator).map(str::to_owned).collect();
     // Without a single name that is none of a number it is a table without header.
     if names.len() < 2 || names.iter().all(|n| n.parse::<f64>().is_ok()) {
         return None;
     }
-    let rows: Vec<&str> = lines.take(ROWS).map(|(_, line)| line).collect();
+    let mut units = Vec::new();
+    let mut rows: Vec<&str> = Vec::new();
+    for (number, line) in lines.take(ROWS) {
+        let stated = match rows.is_empty() && units.is_empty() {
+            true => unit_row(&names, cells(line, separator), |_| false).and_then(Result::ok),
+            false => None,
+        };
+        match stated {
+            Some(stated) => (above, units) = (number, stated),
+            None => rows.push(line),
+        }
+    }
     let is_number = |cell: &str| cell.parse::<f64>().is_ok();
     // `1,5` where something else than a comma separates.
     let comma = |cell: &str| !is_number(cell) && is_number(&cell.replacen(',', ".", 1));
     let decimal_comma =
         separator != Some(',') && rows.iter().any(|row| cells(row, separator).any(comma));
     let mut columns = vec![Vec::new(); names.len()];
-    for line in rows {
+    let mut dates = vec![false; names.len()];
+    let mut texts: Vec<Option<String>> = Vec::new();
+    for (r, line) in rows.iter().enumerate() {
         let mut row = cells(line, separator);
-        for column in &mut columns {
-            let number = row.next().and_then(|cell| match decimal_comma {
+        for (i, column) in columns.iter_mut().enumerate() {
+            let cell = row.next().unwrap_or_default();
+            let number = match decimal_comma {
                 true => cell.replacen(',', ".", 1).parse::<f64>().ok(),
                 false => cell.parse::<f64>().ok(),
-            });
-            column.push(number.filter(|x| x.is_finite()));
+            };
+            let date = || date_time(cell).map(|date| date.seconds);
+            let value = number.or_else(date);
+            dates[i] |= number.is_none() && value.is_some();
+            column.push(value.filter(|x| x.is_finite()));
+            let text = value.is_none() && !cell.is_empty();
+            if r == 0 {
+                texts.push(text.then(|| cell.to_owned()));
+            } else if texts[i].as_deref() != Some(cell) {
+                texts[i] = None;
+            }
         }
     }
+    texts.resize(names.len(), None);
     Some(Header {
         names,
         columns,
+        dates,
+        texts,
         decimal_comma,
         line: above as u64 + 1,
+        units,
         delimiter: match separator {
             Some(';') => Delimiter::Semicolon,
             Some('\t') => Delimiter::Tab,
@@ -104,6 +161,15 @@ pub fn header(bytes: &[u8]) -> Option<Header> {
             None => Delimiter::Space,
         },
     })
+}
+
+fn of_delimiter(delimiter: Delimiter) -> Option<char> {
+    match delimiter {
+        Delimiter::Comma => Some(','),
+        Delimiter::Semicolon => Some(';'),
+        Delimiter::Tab => Some('\t'),
+        Delimiter::Space => None,
+    }
 }
 
 /// What separates the cells of a line; `None`: blanks.
@@ -137,6 +203,13 @@ mod tests {
         assert_eq!((found.line, found.delimiter), (3, Delimiter::Semicolon));
         let comma = header(b"a;b\n1,5;2\n").expect("a table");
         assert!(comma.decimal_comma && comma.largest(0) == 1.5);
+        let units = header(b"sep=;\n\na;b;c\n[deg];mm;-\n1,5;2;3\n").expect("units");
+        assert_eq!((units.line, units.largest(0)), (4, 1.5));
+        assert_eq!(
+            units.unit(1).unit,
+            Some(NamedUnit::Length(calib_recording::LengthUnit::Mm))
+        );
+        assert_eq!(units.unit(2).unit, None);
         assert_eq!(header(b"1,2,3\n4,5,6\n"), None);
         assert_eq!(header(b""), None);
         assert_eq!(header(b"one\n"), None);

@@ -23,6 +23,7 @@ pub mod mistake;
 pub mod name;
 pub mod proposal;
 mod propose;
+mod quaternions;
 pub mod robot;
 pub mod session;
 pub mod signs;

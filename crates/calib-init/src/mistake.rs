@@ -65,7 +65,12 @@ pub enum Mistake {
         /// The body.
         body: String,
     },
-    /// A convention of poses was misread.
+    /// The quaternions are in another order than their columns' names say.
+    Quaternions {
+        /// The scalar is the first of the four; else the last.
+        first: bool,
+    },
+    /// Another convention of poses was misread.
     Poses,
     /// A joint moved, and no column holds its readings.
     MissingColumn {

@@ -1,6 +1,6 @@
 //! What a column's name says: its words, its unit, its number.
 
-use calib_recording::{AngleUnit, LengthUnit, TimeUnit};
+use calib_recording::{AngleUnit, LengthUnit, StatedUnit, TimeUnit};
 
 /// A unit that stands in a name.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -11,6 +11,19 @@ pub enum NamedUnit {
     Length(LengthUnit),
     /// Of a time.
     Time(TimeUnit),
+    /// Of something else, such as a speed or a torque.
+    Other,
+}
+
+impl From<StatedUnit> for NamedUnit {
+    fn from(unit: StatedUnit) -> Self {
+        match unit {
+            StatedUnit::Angle(unit) => Self::Angle(unit),
+            StatedUnit::Length(unit) => Self::Length(unit),
+            StatedUnit::Time(unit) => Self::Time(unit),
+            _ => Self::Other,
+        }
+    }
 }
 
 /// A name without its unit, and the unit.
@@ -61,13 +74,10 @@ impl NamedUnit {
     #[must_use]
     pub fn name(self) -> &'static str {
         match self {
-            Self::Angle(AngleUnit::Rad) => "rad",
-            Self::Angle(AngleUnit::Deg) => "deg",
+            Self::Angle(unit) => unit.name(),
             Self::Length(unit) => unit.name(),
-            Self::Time(TimeUnit::S) => "s",
-            Self::Time(TimeUnit::Ms) => "ms",
-            Self::Time(TimeUnit::Us) => "us",
-            Self::Time(TimeUnit::Ns) => "ns",
+            Self::Time(unit) => unit.name(),
+            Self::Other => "",
         }
     }
 }
@@ -123,7 +133,9 @@ pub const PARTS_OF_SECONDS: [&str; 6] = [
 /// How well a name says that a column is the time of its row, best first: a word alone, the stamp of a message, a word among others.
 #[must_use]
 pub fn time(name: &str) -> Option<u8> {
-    const ALONE: [&str; 11] = [
+    const ALONE: [&str; 13] = [
+        "date",
+        "datetime",
         "t",
         "time",
         "timestamp",
@@ -136,7 +148,8 @@ pub fn time(name: &str) -> Option<u8> {
         "zeitstempel",
         "temps",
     ];
-    const AMONG: [&str; 6] = [
+    const AMONG: [&str; 7] = [
+        "datetime",
         "time",
         "timestamp",
         "timestamps",
@@ -151,8 +164,10 @@ pub fn time(name: &str) -> Option<u8> {
     let words = words(unit.stem);
     let all: Vec<&str> = words.iter().map(String::as_str).collect();
     match all.as_slice() {
+        // When `rostopic` received a message: later than its own stamp.
+        [_] if name.starts_with('%') => Some(2),
         [word] if ALONE.contains(word) => Some(0),
-        ["header", "stamp", ..] => Some(1),
+        ["header", "stamp", ..] | [_, "header", "stamp"] => Some(1),
         words if words.iter().any(|w| AMONG.contains(w)) => Some(2),
         _ => None,
     }
@@ -354,6 +369,7 @@ mod tests {
             assert_eq!(time(name), None, "{name}");
         }
         assert!(time("header.stamp") < time("rosbagTimestamp"));
+        assert!(time("field.header.stamp") < time("%time"));
     }
 
     #[test]

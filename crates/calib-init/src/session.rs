@@ -219,11 +219,14 @@ fn is_by_rows(tracked: &Source, log: &Source) -> Result<bool, InitError> {
     let (rows, of_log) = (rows_of(&tracked.recording), rows_of(&log.recording));
     match rows == of_log {
         true => Ok(true),
-        false => Err(InitError::RowsDiffer {
-            file: tracked.file.shown.clone(),
-            log: log.file.shown.clone(),
-            rows: (rows, of_log),
-        }),
+        false => {
+            let unread = [tracked, log].into_iter().find_map(Source::times_not_read);
+            Err(unread.unwrap_or_else(|| InitError::RowsDiffer {
+                file: tracked.file.shown.clone(),
+                log: log.file.shown.clone(),
+                rows: (rows, of_log),
+            }))
+        }
     }
 }
 

@@ -144,6 +144,29 @@ impl Source {
         )
     }
 
+    /// The error about columns that seem to hold times and could not be read.
+    #[must_use]
+    pub fn times_not_read(&self) -> Option<InitError> {
+        let columns = self.facts.iter().find_map(|about| match about {
+            About::Ignored { times, parts, .. } => {
+                let parts = parts.iter().flat_map(|(whole, part)| [whole, part]);
+                Some(times.iter().chain(parts).cloned().collect())
+            }
+            _ => None,
+        });
+        let columns: Vec<String> = columns.unwrap_or_default();
+        (!columns.is_empty()).then(|| InitError::TimesNotRead {
+            file: self.file.shown.clone(),
+            columns,
+        })
+    }
+
+    /// What the file calls a body or marker of the profile.
+    #[must_use]
+    pub fn name_in_file<'n>(&'n self, name: &'n str) -> &'n str {
+        self.renamed.get(name).map_or(name, String::as_str)
+    }
+
     /// It has joints of this robot.
     #[must_use]
     pub fn has_joints(&self) -> bool {

@@ -55,10 +55,14 @@ fn recording_of(draft: &Draft, sources: &[Source]) -> Result<Recording, InitErro
     let Some(log) = draft.log else {
         return Ok(recording);
     };
+    let files = [source, &sources[log]];
     let log = sources[log].recording.clone();
     match draft.stream {
         Some(_) => Ok(with_robot_log(recording, log)),
         None => with_robot_rows(recording, log).map_err(|e| {
+            if let Some(unread) = files.into_iter().find_map(Source::times_not_read) {
+                return unread;
+            }
             let problem = Box::new(DataProblem::RowsDiffer(e));
             let file = source.file.shown.clone();
             PipelineError::Data { file, problem }.into()

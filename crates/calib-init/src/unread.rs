@@ -77,6 +77,27 @@ pub(crate) fn times(header: &Header, columns: &[String]) -> Option<String> {
     named.find(empty).cloned()
 }
 
+/// The columns of whole seconds and of the parts of a second, where one time stands in both: `stamp.sec` and `stamp.nanosec`.
+pub(crate) fn parts(header: &Header) -> Option<(String, String)> {
+    const WHOLE: [&str; 3] = ["sec", "secs", "seconds"];
+    let split = |name: &String| {
+        let mut words = name::words(name);
+        words.pop().map(|last| (words, last))
+    };
+    let all = || {
+        header
+            .names
+            .iter()
+            .filter_map(|name| Some((name, split(name)?)))
+    };
+    let is_part = |last: &String| name::PARTS_OF_SECONDS.contains(&last.as_str());
+    all().find_map(|(part, (of, last))| {
+        let mut others = all().filter(|_| is_part(&last));
+        let whole = others.find(|(_, (o, last))| *o == of && WHOLE.contains(&last.as_str()))?;
+        Some((whole.0.clone(), part.clone()))
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -89,8 +110,11 @@ mod tests {
                 .iter()
                 .map(|name| vec![(!text.contains(name)).then_some(0.5); 3])
                 .collect(),
+            dates: vec![false; names.len()],
+            texts: vec![None; names.len()],
             decimal_comma: false,
             line: 1,
+            units: Vec::new(),
             delimiter: Delimiter::Comma,
         }
     }

@@ -267,25 +267,7 @@ fn of_columns(about: &About) -> String {
             let how = if *named { "" } else { ", by its numbers" };
             format!("`{column}` is the time in {unit}{how}.")
         }
-        About::Ignored {
-            columns,
-            orientation,
-            times,
-        } => {
-            let mut text = format!("Not used: {}.", quoted(columns));
-            if !orientation.is_empty() {
-                text += &format!(
-                    " {} seem to be an orientation: without it the body is a point. Write it as a quaternion, `<body>.qx` to `<body>.qw`, or map its columns.",
-                    quoted(orientation)
-                );
-            }
-            if let Some(times) = times {
-                text += &format!(
-                    " `{times}` seems to hold times as text: without times every row is a pose at rest. Write them in seconds, as `t_s`."
-                );
-            }
-            text
-        }
+        About::Ignored { .. } => ignored(about),
         _ => String::new(),
     }
 }
@@ -294,9 +276,8 @@ fn of_computed(about: &About) -> String {
     let About::Computed {
         body,
         columns,
-        rms,
+        rms: [own, next],
         other,
-        next,
         ..
     } = about
     else {
@@ -308,9 +289,40 @@ fn of_computed(about: &About) -> String {
     };
     format!(
         "{what} are left out: they fit the nominal robot to {}, `{other}` to {}. A controller computed them from its joints; they are no measurement.",
-        mm(*rms),
+        mm(*own),
         mm(*next)
     )
+}
+
+/// Columns that nothing uses, and what some of them seem to be.
+fn ignored(about: &About) -> String {
+    let About::Ignored {
+        columns,
+        orientation,
+        times,
+        parts,
+    } = about
+    else {
+        return String::new();
+    };
+    let mut text = format!("Not used: {}.", quoted(columns));
+    if !orientation.is_empty() {
+        text += &format!(
+            " {} seem to be an orientation: without it the body is a point. Write it as a quaternion, `<body>.qx` to `<body>.qw`, or map its columns.",
+            quoted(orientation)
+        );
+    }
+    if let Some(times) = times {
+        text += &format!(
+            " `{times}` seems to hold times as text: without times every row is a pose at rest. Write them in seconds, as `t_s`, or as dates with the year first (`2024-05-01T12:00:00.123Z`)."
+        );
+    }
+    if let Some((whole, part)) = parts {
+        text += &format!(
+            " `{whole}` and `{part}` are the parts of one time: without times every row is a pose at rest. Write their sum in seconds, as `t_s`."
+        );
+    }
+    text
 }
 
 fn of_session(about: &About) -> String {

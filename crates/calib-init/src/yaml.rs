@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use calib_profile::edit::Value;
-use calib_recording::{AngleUnit, BodyColumns, ColumnMap, Delimiter, LengthUnit, TimeUnit};
+use calib_recording::{AngleUnit, BodyColumns, ColumnMap, Delimiter, LengthUnit};
 
 /// A text, quoted where YAML would read something else.
 #[must_use]
@@ -90,12 +90,7 @@ pub fn columns(columns: &ColumnMap) -> Vec<(String, Value)> {
         line("lengths", columns.lengths.name().to_owned());
     }
     if let Some(time) = &columns.time {
-        let unit = match time.unit {
-            TimeUnit::S => "s",
-            TimeUnit::Ms => "ms",
-            TimeUnit::Us => "us",
-            TimeUnit::Ns => "ns",
-        };
+        let unit = time.unit.name();
         line(
             "time",
             format!("{{column: {}, unit: {unit}}}", text(&time.column)),
@@ -130,8 +125,15 @@ pub fn columns(columns: &ColumnMap) -> Vec<(String, Value)> {
 }
 
 fn body(name: &str, body: &BodyColumns) -> String {
-    let turn = body.quaternion_xyzw.as_ref().map(list);
-    let turn = turn.map_or_else(String::new, |turn| format!(", quaternion_xyzw: {turn}"));
+    let orders = [
+        ("quaternion_xyzw", &body.quaternion_xyzw),
+        ("quaternion_wxyz", &body.quaternion_wxyz),
+    ];
+    let turn = orders.map(|(key, columns)| {
+        let columns = columns.as_ref().map(list);
+        columns.map_or_else(String::new, |columns| format!(", {key}: {columns}"))
+    });
+    let turn = turn.concat();
     format!(
         "{}: {{position: {}{turn}}}",
         text(name),

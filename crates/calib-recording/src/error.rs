@@ -56,6 +56,29 @@ pub enum Problem {
         /// Offset within the line, from 0.
         byte: usize,
     },
+    /// Text that begins as UTF-16 and is not.
+    #[error("the file begins as UTF-16 text, and this byte is not UTF-16")]
+    NotUtf16,
+    /// A first line `sep=…` with something that separates no cells.
+    #[error("the line states that `{}` separates the cells", excerpt(.found, 20))]
+    SeparatorLine {
+        /// What it states.
+        found: String,
+    },
+    /// A cell of a row of units that is no unit.
+    #[error("this row states units, and `{found}` is not one of those that are known")]
+    UnknownUnit {
+        /// What stands there.
+        found: String,
+    },
+    /// A row of units against something else that states the unit.
+    #[error("this row states the unit `{found}`, but {against}")]
+    UnitAgainst {
+        /// What stands there.
+        found: String,
+        /// What states another one.
+        against: Against,
+    },
     /// A line longer than any table has.
     #[error("the line is longer than {limit} bytes")]
     LineTooLong {
@@ -135,6 +158,20 @@ pub enum Problem {
         found: String,
         /// What should be.
         expected: String,
+    },
+    /// A text where a time is expected.
+    #[error("found `{found}`, which is no time that can be read")]
+    TimeText {
+        /// What stands there.
+        found: String,
+    },
+    /// A time that other rows state otherwise.
+    #[error("found `{found}`, and the rows before have {before}")]
+    OtherTime {
+        /// What stands there.
+        found: String,
+        /// How the times of the rows before are written.
+        before: &'static str,
     },
     /// Infinity.
     #[error("found `{found}`: not finite")]
@@ -288,85 +325,6 @@ pub enum Problem {
     },
 }
 
-impl Problem {
-    /// What the person can do about it.
-    #[must_use]
-    pub fn remedy(&self) -> String {
-        let text = match self {
-            Problem::Io(source) => match source.kind() {
-                std::io::ErrorKind::PermissionDenied => "give yourself the right to read it",
-                std::io::ErrorKind::IsADirectory => "name a file in it",
-                _ => "correct the path",
-            },
-            Problem::Empty | Problem::NoRows => {
-                "export the recording again; the copy or download was probably cut off"
-            }
-            Problem::TooLarge { .. } => "cut the recording into parts, or raise the limit",
-            Problem::NotUtf8 { .. } => "save the file as UTF-8",
-            Problem::LineTooLong { .. } => {
-                "give the recording: a text file of lines, or name its format"
-            }
-            Problem::DuplicateColumn { .. } => "rename or remove one",
-            Problem::UnknownColumn { .. } | Problem::MissingColumn { .. } => {
-                "correct the name, or map the columns with a column map (`columns` in the profile)"
-            }
-            Problem::IncompleteEntity { .. } => {
-                "export all its columns, or remove those that are there"
-            }
-            Problem::ColumnMap(fault) => return fault.remedy(),
-            Problem::Ragged {
-                decimal_comma: Some(_),
-                ..
-            } => {
-                "write decimal points, or separate the cells with `;` and state `columns: {decimal_comma: true}`; otherwise delete the extra cells"
-            }
-            Problem::Ragged {
-                found, expected, ..
-            } if found > expected => "delete the extra cells",
-            Problem::Ragged { .. } => "complete the line; a lost sample has empty cells",
-            Problem::Unexpected { .. } | Problem::Misfit { .. } => {
-                "export the recording again, or correct it there"
-            }
-            Problem::NotFinite { .. } => "leave the cell empty where nothing was measured",
-            Problem::PartlyLost { .. } => "leave all empty when it was lost",
-            Problem::TimeBackwards { .. } => "sort the rows by time",
-            Problem::FrameBackwards { .. } => "sort the rows by frame",
-            Problem::RepeatedSample { .. } => "remove one of them",
-            Problem::PoseTwice { .. } => "give every pose a name of its own",
-            Problem::PointTwice { .. } => {
-                "give a repeated measurement a pose of its own, or remove one of them"
-            }
-            Problem::NotUnit { .. } | Problem::NotRotation { .. } => {
-                "check the columns' order and scale"
-            }
-            Problem::Truncated { .. } => "copy the file again: its end is missing",
-            Problem::TooSparse { .. } => "is the name column right? correct the column map",
-            Problem::UnknownFormat { .. } => {
-                "name the format, or describe the columns with a column map"
-            }
-            Problem::UnknownReader { .. } => {
-                "name one of these, or leave it out: the content tells"
-            }
-            Problem::NameTaken { name, .. } => {
-                return format!(
-                    "map `{name}` to another name too (two names can be exchanged), or leave it out (`names` of the profile, `--map`)"
-                );
-            }
-            Problem::NoSuchName { known, .. } if known.is_empty() => {
-                "leave it out: the recording has joints only"
-            }
-            Problem::NoSuchName { known, .. } => {
-                return format!(
-                    "write the name that the recording has: {}",
-                    known.join(", ")
-                );
-            }
-            Problem::Unsupported { remedy, .. } => remedy,
-        };
-        text.to_owned()
-    }
-}
-
 fn quoted(found: &str) -> String {
     if found.is_empty() {
         "empty".to_string()
@@ -387,6 +345,25 @@ fn did_you_mean(nearest: &Option<String>) -> String {
         .as_ref()
         .map(|word| format!("; did you mean `{word}`?"))
         .unwrap_or_default()
+}
+
+/// What a row of units contradicts.
+#[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum Against {
+    /// The name of the column.
+    #[error("the column's name states `{0}`")]
+    Name(&'static str),
+    /// The column map.
+    #[error("the column map states `{key}: {unit}`")]
+    Map {
+        /// The key.
+        key: &'static str,
+        /// Its value.
+        unit: &'static str,
+    },
+    /// What the column is read as.
+    #[error("the column is read as {0}")]
+    Quantity(&'static str),
 }
 
 impl fmt::Display for Error {

@@ -25,6 +25,8 @@
 //! checked by `calib-checks`.
 
 mod column_map;
+mod date_time;
+mod encoding;
 mod error;
 mod growth;
 mod map_fault;
@@ -32,23 +34,27 @@ mod model;
 mod placeholder;
 mod poses;
 pub mod readers;
+mod remedy;
 mod rename;
 mod table;
 mod text;
 mod units;
 
 pub use column_map::{BodyColumns, ColumnMap, Delimiter, LongColumns, PRESETS, TimeColumn};
-pub use error::{At, Error, Problem};
+pub use date_time::{DateTime, date_time};
+pub use encoding::utf8;
+pub use error::{Against, At, Error, Problem};
 pub use map_fault::{MapFault, StatedUnits};
 pub use model::{
-    BodyStream, Filled, JointStream, JointUnit, MarkerSample, MarkerStream, Meta, Recording,
-    TemperatureStream, Timeline, TorqueStream, WHOLE_ROBOT,
+    BodyStream, Filled, JointColumn, JointStream, JointUnit, MarkerSample, MarkerStream, Meta,
+    Recording, TemperatureStream, Timeline, TorqueStream, WHOLE_ROBOT,
 };
 pub use poses::{NotOneTable, Poses};
 pub use readers::{ReadOptions, RotationForm, read_bytes, read_path, read_path_with};
 pub use rename::renamed_comment;
 pub use table::{
-    NotWritten, WRITTEN_LIVE, WriteOptions, joint_column, write_mapped, write_poses,
-    write_recording,
+    NotWritten, StatedUnit, UnitRow, WRITTEN_LIVE, WriteOptions, joint_column, unit_row,
+    write_mapped, write_poses, write_recording,
 };
+pub use text::stated_separator;
 pub use units::{AngleUnit, LengthUnit, TimeUnit};

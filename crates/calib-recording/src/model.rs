@@ -40,6 +40,17 @@ pub struct Meta {
     pub up_axis: Option<String>,
     /// What the reader noticed.
     pub findings: Vec<Finding>,
+    /// The columns of joints, by the joint, of a table.
+    pub joint_columns: BTreeMap<String, JointColumn>,
+}
+
+/// The column of a joint.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct JointColumn {
+    /// Its name.
+    pub name: String,
+    /// The unit in which it was read, as it stands behind `_` in names: `deg`.
+    pub unit: &'static str,
 }
 
 /// Sampling instants of one device.

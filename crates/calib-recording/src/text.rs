@@ -1,5 +1,6 @@
 //! Lines, cells and numbers of text files: streamed, counted, and checked as they come.
 
+use crate::column_map::Delimiter;
 use crate::error::{At, Placed, Problem, excerpt};
 use calib_finding::from_cell;
 use std::io::{BufRead, Read};
@@ -91,6 +92,61 @@ impl Separator {
     }
 }
 
+/// The separator that a first line `sep=;` states, as spreadsheets write it; an error is what it states and no table has.
+pub fn stated_separator(line: &str) -> Option<Result<Delimiter, &str>> {
+    let line = line.trim_end_matches(['\r', '\n', ' ']);
+    let line = line.strip_prefix('"').unwrap_or(line);
+    let (key, stated) = line.split_at_checked(4)?;
+    if !key.eq_ignore_ascii_case("sep=") {
+        return None;
+    }
+    let mut rest = stated.trim_end_matches('"');
+    // The line of a table of `;` may be padded with them.
+    if let Some(first) = rest.chars().next() {
+        rest = match rest.chars().all(|c| c == first) {
+            true => &rest[..first.len_utf8()],
+            false => rest,
+        };
+    }
+    Some(match rest {
+        "," => Ok(Delimiter::Comma),
+        ";" => Ok(Delimiter::Semicolon),
+        "\t" | "\\t" => Ok(Delimiter::Tab),
+        // A blank at the end of the line may be gone.
+        "" => Ok(Delimiter::Space),
+        other => Err(other),
+    })
+}
+
+impl From<Delimiter> for Separator {
+    fn from(delimiter: Delimiter) -> Self {
+        match delimiter {
+            Delimiter::Comma => Separator::Byte(b','),
+            Delimiter::Semicolon => Separator::Byte(b';'),
+            Delimiter::Tab => Separator::Byte(b'\t'),
+            Delimiter::Space => Separator::Blanks,
+        }
+    }
+}
+
+/// The header line of a text, the first that is neither blank nor a comment nor states the separator, and its separator.
+pub(crate) fn header_line(text: &str) -> Option<(&str, Separator)> {
+    let mut stated = None;
+    for (i, line) in text.lines().enumerate() {
+        if i == 0
+            && let Some(separator) = stated_separator(line)
+        {
+            stated = separator.ok().map(Separator::from);
+            continue;
+        }
+        let separator = stated.unwrap_or_else(|| Separator::guess(line));
+        if !is_blank(line, separator) && !line.starts_with('#') {
+            return Some((line, separator));
+        }
+    }
+    None
+}
+
 /// The cells of a line, trimmed, quotes removed.
 pub(crate) fn cells(line: &str, separator: Separator) -> Cells<'_> {
     let rest = if separator == Separator::Blanks {
@@ -142,6 +198,7 @@ pub(crate) fn unquoted(cell: &str) -> String {
     from_cell(&cell.replace("\"\"", "\"")).to_owned()
 }
 
+#[derive(Clone)]
 pub(crate) struct Cells<'a> {
     rest: Option<&'a str>,
     separator: Separator,

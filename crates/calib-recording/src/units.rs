@@ -104,6 +104,15 @@ impl AngleUnit {
         }
     }
 
+    /// From the words and signs for it: `deg`, `degrees`, `°`, `rad`, … .
+    pub fn from_text(text: &str) -> Option<Self> {
+        match text.trim().to_ascii_lowercase().as_str() {
+            "rad" | "radian" | "radians" => Some(AngleUnit::Rad),
+            "deg" | "degree" | "degrees" | "°" => Some(AngleUnit::Deg),
+            _ => None,
+        }
+    }
+
     /// Abbreviation, as it stands behind `_` in a column's name.
     pub fn name(self) -> &'static str {
         match self {
@@ -136,6 +145,27 @@ impl TimeUnit {
             TimeUnit::Ms => 1e3,
             TimeUnit::Us => 1e6,
             TimeUnit::Ns => 1e9,
+        }
+    }
+
+    /// From the words for it: `s`, `seconds`, `ms`, … .
+    pub fn from_text(text: &str) -> Option<Self> {
+        match text.trim().to_ascii_lowercase().as_str() {
+            "s" | "sec" | "secs" | "second" | "seconds" => Some(TimeUnit::S),
+            "ms" | "msec" | "millisecond" | "milliseconds" => Some(TimeUnit::Ms),
+            "us" | "µs" | "usec" | "microsecond" | "microseconds" => Some(TimeUnit::Us),
+            "ns" | "nsec" | "nanosecond" | "nanoseconds" => Some(TimeUnit::Ns),
+            _ => None,
+        }
+    }
+
+    /// Abbreviation, as it stands behind `_` in a column's name.
+    pub fn name(self) -> &'static str {
+        match self {
+            TimeUnit::S => "s",
+            TimeUnit::Ms => "ms",
+            TimeUnit::Us => "us",
+            TimeUnit::Ns => "ns",
         }
     }
 }

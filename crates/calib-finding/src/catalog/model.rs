@@ -185,10 +185,10 @@ super::topic! {
     QUATERNION_ORDER = "quaternion-order" {
         "scalar_first": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} with the quaternions of {bodies:code} read scalar first[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
-            "Rename the columns, or list them under `quaternion_wxyz` in the column map: the file writes w, x, y, z.";
+            "The file writes w, x, y, z: name the four columns in that order (`qw`, `qx`, `qy`, `qz`). Or keep their names and list them in the order of the file under `quaternion_wxyz` of the body in the column map: `columns: {bodies: {NAME: {position: [X, Y, Z], quaternion_wxyz: [FIRST, SECOND, THIRD, FOURTH]}}}`.";
         "scalar_last": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} with the quaternions of {bodies:code} read scalar last[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
-            "Rename the columns: the file writes x, y, z, w.";
+            "The file writes x, y, z, w: list the four columns in the order of the file under `quaternion_xyzw` of the body in the column map, not under `quaternion_wxyz`; or name them in that order (`qx`, `qy`, `qz`, `qw`).";
     }
     /// Poses in another convention.
     POSE_CONVENTION = "pose-convention" {

@@ -34,8 +34,11 @@ pub(super) fn is_guess(about: &About) -> bool {
         About::Rigid { sigma, .. } => sigma.is_some_and(|s| s >= LOOSE),
         About::Time { named, .. } => !named,
         About::Ignored {
-            orientation, times, ..
-        } => times.is_some() || !orientation.is_empty(),
+            orientation,
+            times,
+            parts,
+            ..
+        } => times.is_some() || parts.is_some() || !orientation.is_empty(),
         About::Log { named, rows, .. } => !named || rows.is_some(),
         About::TipOfChain { .. }
         | About::LinkUnknown { .. }

@@ -20,7 +20,7 @@ pub(super) fn sentence(about: &About) -> String {
             residuals,
             equivalent,
         } => format!(
-            "{} It explains the recordings ({}), but no profile corrects it: correct the table, or see what `calib check` says.{}",
+            "{} It explains the recordings ({}). The profile as written does not correct it: correct the table, or do what `calib check` says.{}",
             found(mistake),
             improvement(residuals),
             not_distinguished(equivalent)
@@ -87,6 +87,12 @@ fn found(mistake: &Mistake) -> String {
         }
         Mistake::Remounted { body } => {
             format!("`{body}` moved on its link between recordings.")
+        }
+        Mistake::Quaternions { first: true } => {
+            "The quaternions are written scalar first: w, x, y, z.".to_owned()
+        }
+        Mistake::Quaternions { first: false } => {
+            "The quaternions are written scalar last: x, y, z, w.".to_owned()
         }
         Mistake::Poses => "The convention of the tracked poses was misread.".to_owned(),
         Mistake::MissingColumn { joint } => {

@@ -1,6 +1,7 @@
 //! Tests of the public interface, one program.
 
 mod designs;
+mod dialects;
 mod edit;
 mod faulty;
 mod hidden;

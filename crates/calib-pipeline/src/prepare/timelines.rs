@@ -51,6 +51,8 @@ pub fn with_robot_log(mut tracker: Recording, robot: Recording) -> Recording {
     tracker.temperatures.extend(temperatures);
     tracker.meta.conversions.extend(robot.meta.conversions);
     tracker.meta.findings.extend(robot.meta.findings);
+    let columns = robot.meta.joint_columns;
+    tracker.meta.joint_columns.extend(columns);
     tracker
 }
 

@@ -1,10 +1,11 @@
 //! Our own tables, and any delimited table with a column map.
 
+use super::common::head_text;
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
 use crate::model::Recording;
 use crate::table::{Known, is_canonical, read_table};
-use crate::text::{Separator, cells, is_blank};
+use crate::text::{cells, header_line};
 use calib_finding::nearest_word;
 use std::io::BufReader;
 
@@ -51,10 +52,10 @@ pub(super) fn is_of_tables(id: &str) -> bool {
 }
 
 fn has_columns(head: &[u8], wanted: &[&str]) -> bool {
-    let line = header_line(head).unwrap_or("");
-    wanted
-        .iter()
-        .all(|name| cells(line, Separator::guess(line)).any(|cell| cell == *name))
+    header_line(head_text(head)).is_some_and(|(line, separator)| {
+        let has = |name: &&str| cells(line, separator).any(|cell| cell == *name);
+        wanted.iter().all(has)
+    })
 }
 
 /// The preset, or the caller's own map on top of it.
@@ -71,25 +72,15 @@ fn with_preset(preset: &str, input: &mut dyn Input, options: &ReadOptions) -> Pl
 }
 
 fn detect(head: &[u8]) -> bool {
-    header_line(head).is_some_and(|line| is_canonical(cells(line, Separator::guess(line))))
-}
-
-/// The first line that is neither blank nor a comment.
-fn header_line(head: &[u8]) -> Option<&str> {
-    let head = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
-    let text = match std::str::from_utf8(head) {
-        Ok(text) => text,
-        Err(error) => std::str::from_utf8(&head[..error.valid_up_to()]).ok()?,
-    };
-    text.lines()
-        .find(|line| !is_blank(line, Separator::guess(line)) && !line.starts_with('#'))
+    header_line(head_text(head))
+        .is_some_and(|(line, separator)| is_canonical(cells(line, separator)))
 }
 
 /// Several cells, none of them binary; or nothing but comments.
 pub(super) fn looks_like_a_table(head: &[u8]) -> bool {
     !head.contains(&0)
-        && header_line(head).is_none_or(|line| {
-            cells(line, Separator::guess(line)).count() >= 2
+        && header_line(head_text(head)).is_none_or(|(line, separator)| {
+            cells(line, separator).count() >= 2
                 && !line.chars().any(|c| c.is_control() && c != '\t')
         })
 }

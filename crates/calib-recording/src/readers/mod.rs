@@ -11,6 +11,7 @@ mod trc;
 mod vicon;
 
 use crate::column_map::ColumnMap;
+use crate::encoding::{is_utf16, utf8};
 use crate::error::{At, Error, Placed, Problem, in_file};
 use crate::model::Recording;
 use calib_finding::nearest_word;
@@ -223,7 +224,18 @@ fn read_placed(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording
         return Err((At::File, Problem::Empty));
     }
     input.seek(SeekFrom::Start(0)).map_err(io)?;
-    let reader = choose(&head, options)?;
+    if is_utf16(&head) {
+        let mut bytes = Vec::new();
+        input.read_to_end(&mut bytes).map_err(io)?;
+        let text = utf8(&bytes).map_err(|byte| (At::Byte(byte), Problem::NotUtf16))?;
+        return read_recognized(&mut Cursor::new(&*text), &text, options);
+    }
+    read_recognized(input, &head, options)
+}
+
+/// Reads what is no UTF-16; `head`: its first bytes.
+fn read_recognized(input: &mut dyn Input, head: &[u8], options: &ReadOptions) -> Placed<Recording> {
+    let reader = choose(&head[..head.len().min(HEAD_BYTES)], options)?;
     let mut recording = (reader.read)(input, options)?;
     recording.meta.format = reader.id.to_string();
     Ok(recording)

@@ -2,10 +2,12 @@
 
 use super::header::{Known, Layout};
 use super::rows::Rows;
-use crate::column_map::{ColumnMap, Delimiter};
+use super::unit_row;
+use crate::column_map::ColumnMap;
+use crate::date_time::date_time;
 use crate::error::{At, Placed, Problem};
 use crate::model::Recording;
-use crate::text::{Lines, Separator, cells, is_blank, unquoted};
+use crate::text::{Lines, Separator, cells, is_blank, stated_separator, unquoted};
 use calib_finding::{Finding, Subject, catalog};
 use std::io::BufRead;
 
@@ -21,62 +23,123 @@ pub(crate) fn read_table(
 ) -> Placed<Recording> {
     let mut lines = Lines::new(input);
     let mut comments = Vec::new();
-    let (layout, separator) = match read_header(&mut lines, (map, known), &mut comments)? {
+    let (number, names, separator) = match read_header(&mut lines, map, &mut comments)? {
         Some(found) => found,
         None if lines.number() == 0 => return Err((At::File, Problem::Empty)),
         None => return Err((At::Line(lines.number()), Problem::NoRows)),
     };
-    let mut rows = Rows::new(layout, separator, map);
-    let live = comments.iter().any(|comment| comment == WRITTEN_LIVE);
-    let (mut cut, mut blank) = (None, Vec::new());
-    loop {
+    let mut first = first_row(&mut lines, separator)?;
+    let units = match first.last() {
+        Some((number, line, _)) => unit_row::read(*number, cells(line, separator), &names, map)?,
+        None => None,
+    };
+    if units.is_some() {
+        first.pop();
+        first.extend(first_row(&mut lines, separator)?);
+    }
+    let dates = dates(first.last(), separator);
+    let layout = Layout::new(number, names, (units.as_ref(), &dates), (map, known))?;
+    let mut body = Body {
+        live: comments.iter().any(|comment| comment == WRITTEN_LIVE),
+        rows: Rows::new(layout, separator, map),
+        separator,
+        comments,
+        cut: None,
+        blank: Vec::new(),
+    };
+    for (number, line, whole) in first {
+        body.line(number, &line, whole)?;
+    }
+    while body.cut.is_none() {
         let number = lines.number() + 1;
         let Some((line, whole)) = lines.next_whole()? else {
             break;
         };
-        if live && !whole {
-            cut = Some(number);
-            break;
-        }
-        if let Some(comment) = line.strip_prefix('#') {
-            comments.push(comment.trim().to_string());
-        } else if is_blank(line, separator) {
-            // At the end of a table nothing follows that such a row could stand before.
-            if !line.trim().is_empty() && rows.blank_is_a_sample() {
-                blank.push((number, line.to_owned()));
-            }
-        } else {
-            for (number, line) in blank.drain(..) {
-                rows.read(number, &line)?;
-            }
-            rows.read(number, line)?;
-        }
+        body.line(number, line, whole)?;
     }
-    if rows.is_empty() {
+    if body.rows.is_empty() {
         return Err((At::Line(lines.number()), Problem::NoRows));
     }
-    let mut recording = rows.finish()?;
+    let mut recording = body.rows.finish()?;
     recording.meta.findings.extend(
-        cut.map(|line| Finding::new(catalog::ROW_CUT_OFF, Subject::default()).at_rows([line])),
+        body.cut
+            .map(|line| Finding::new(catalog::ROW_CUT_OFF, Subject::default()).at_rows([line])),
     );
-    recording.meta.comments = comments;
+    recording.meta.comments = body.comments;
     Ok(recording)
 }
 
-/// Layout and separator; `None` when the file ends before its header.
+/// Which columns of the first row hold a date with a time of day.
+fn dates(first: Option<&Line>, separator: Separator) -> Vec<bool> {
+    let of = |(_, line, _): &Line| {
+        let cells = cells(line, separator);
+        cells.map(|cell| date_time(cell).is_some()).collect()
+    };
+    first.map(of).unwrap_or_default()
+}
+
+/// What stands below the header, while it is read.
+struct Body<'a> {
+    rows: Rows<'a>,
+    separator: Separator,
+    comments: Vec<String>,
+    /// The table was written while it was recorded.
+    live: bool,
+    /// The line of a row that was cut off.
+    cut: Option<u64>,
+    /// Rows without anything in them that may be samples.
+    blank: Vec<(u64, String)>,
+}
+
+impl Body<'_> {
+    /// Reads a line; `whole`: it ended with a line break.
+    fn line(&mut self, number: u64, line: &str, whole: bool) -> Placed<()> {
+        if self.live && !whole {
+            self.cut = Some(number);
+        } else if let Some(comment) = line.strip_prefix('#') {
+            self.comments.push(comment.trim().to_string());
+        } else if is_blank(line, self.separator) {
+            // At the end of a table nothing follows that such a row could stand before.
+            if !line.trim().is_empty() && self.rows.blank_is_a_sample() {
+                self.blank.push((number, line.to_owned()));
+            }
+        } else {
+            for (number, line) in self.blank.drain(..) {
+                self.rows.read(number, &line)?;
+            }
+            self.rows.read(number, line)?;
+        }
+        Ok(())
+    }
+}
+
+/// A line: its number, its text and whether it ended with a line break.
+type Line = (u64, String, bool);
+
+/// The lines up to the first with anything in it that is no comment; it is the last of them.
+fn first_row<R: BufRead>(lines: &mut Lines<R>, separator: Separator) -> Placed<Vec<Line>> {
+    let mut all = Vec::new();
+    while let Some((line, whole)) = lines.next_whole()? {
+        let row = !line.starts_with('#') && !is_blank(line, separator);
+        // Lines without anything need no room.
+        if !line.trim().is_empty() || !whole {
+            let line = line.to_owned();
+            all.push((lines.number(), line, whole));
+        }
+        if row {
+            break;
+        }
+    }
+    Ok(all)
+}
+
+/// Line and names of the header, and the separator; `None` when the file ends before its header.
 fn read_header<R: BufRead>(
     lines: &mut Lines<R>,
-    (map, known): (Option<&ColumnMap>, Known<'_>),
+    map: Option<&ColumnMap>,
     comments: &mut Vec<String>,
-) -> Placed<Option<(Layout, Separator)>> {
-    let given = map
-        .and_then(|map| map.delimiter)
-        .map(|delimiter| match delimiter {
-            Delimiter::Comma => Separator::Byte(b','),
-            Delimiter::Semicolon => Separator::Byte(b';'),
-            Delimiter::Tab => Separator::Byte(b'\t'),
-            Delimiter::Space => Separator::Blanks,
-        });
+) -> Placed<Option<(u64, Vec<String>, Separator)>> {
+    let mut given = map.and_then(|map| map.delimiter).map(Separator::from);
     for _ in 0..map.map_or(0, |map| map.skip_lines) {
         if lines.next()?.is_none() {
             return Ok(None);
@@ -86,10 +149,7 @@ fn read_header<R: BufRead>(
         && !map.names.is_empty()
     {
         let separator = given.unwrap_or(Separator::Byte(b','));
-        return Ok(Some((
-            Layout::new(lines.number(), map.names.clone(), (Some(map), known))?,
-            separator,
-        )));
+        return Ok(Some((lines.number(), map.names.clone(), separator)));
     }
     loop {
         let number = lines.number() + 1;
@@ -103,10 +163,23 @@ fn read_header<R: BufRead>(
             comments.push(comment.trim().to_string());
             continue;
         }
+        if number == 1
+            && let Some(stated) = stated_separator(line)
+        {
+            let found = |found: &str| Problem::SeparatorLine {
+                found: found.to_owned(),
+            };
+            match (given, stated) {
+                (Some(_), _) => {}
+                (None, Ok(stated)) => given = Some(stated.into()),
+                (None, Err(other)) => return Err((At::Line(1), found(other))),
+            }
+            continue;
+        }
         let separator = given.unwrap_or_else(|| Separator::guess(line));
         if !is_blank(line, separator) {
             let names = cells(line, separator).map(unquoted).collect();
-            return Ok(Some((Layout::new(number, names, (map, known))?, separator)));
+            return Ok(Some((number, names, separator)));
         }
     }
 }

@@ -353,7 +353,7 @@ fn misread(poses: &Poses, header: &[String]) -> Option<String> {
         labels: poses.labels.keys().cloned().collect(),
         ..ColumnMap::default()
     };
-    let layout = match Layout::new(1, names, (Some(&map), Known::default())) {
+    let layout = match Layout::new(1, names, (None, &[]), (Some(&map), Known::default())) {
         Ok(layout) => layout,
         Err((_, problem)) => return Some(problem.to_string()),
     };

@@ -38,7 +38,12 @@ pub fn write_mapped(
         true => header(poses, &map, options),
         false => map.names.clone(),
     };
-    let layout = Layout::new(1, names.clone(), (Some(&map), Known::default()));
+    let layout = Layout::new(
+        1,
+        names.clone(),
+        (None, &[]),
+        (Some(&map), Known::default()),
+    );
     let layout = layout.map_err(|(_, problem)| refused(problem.to_string()))?;
     let separator = separator(&map).ok_or_else(|| {
         let why = "with `decimal_comma` a comma cannot separate the cells: give it `delimiter: semicolon`";

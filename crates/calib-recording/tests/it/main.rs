@@ -11,6 +11,7 @@ mod mutations;
 mod real_formats;
 mod real_tables;
 mod tables;
+mod unit_rows;
 
 /// Property tests that are the same on every run.
 fn fixed_seed() -> proptest::test_runner::Config {

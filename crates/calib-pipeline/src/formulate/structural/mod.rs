@@ -6,6 +6,7 @@
 
 mod bodies;
 mod codes;
+mod columns;
 mod declared;
 mod jump;
 mod layout;

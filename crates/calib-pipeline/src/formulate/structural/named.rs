@@ -7,6 +7,7 @@ use calib_checks::structural::{
 use calib_finding::{About, Fact, Finding, Id, Subject, catalog};
 
 use super::codes;
+use super::columns;
 use super::layout::Layout;
 
 /// A fit finds a zero that is off by up to this, rad: of simulated arms all converged from 60°, some not from 75°.
@@ -233,14 +234,15 @@ fn of_hypothesis(layout: &Layout<'_>, outcome: &Outcome, scoped: &Scoped) -> Fin
         }
         Hypothesis::Unit { joint, mistake } => {
             let subject = Subject::joint(layout.joint(joint));
-            Finding::of_kind(catalog::UNIT_MISMATCH, of_one_joint(mistake), subject)
-                .with("joint", Fact::name(layout.joint(joint)))
+            let finding = Finding::of_kind(catalog::UNIT_MISMATCH, of_one_joint(mistake), subject)
+                .with("joint", Fact::name(layout.joint(joint)));
+            columns::with_remedy(layout, finding, Some(joint), mistake, scoped.scope)
         }
-        Hypothesis::Units { mistake } => Finding::of_kind(
-            catalog::UNIT_MISMATCH,
-            of_all_joints(mistake),
-            Subject::default(),
-        ),
+        Hypothesis::Units { mistake } => {
+            let kind = of_all_joints(mistake);
+            let finding = Finding::of_kind(catalog::UNIT_MISMATCH, kind, Subject::default());
+            columns::with_remedy(layout, finding, None, mistake, scoped.scope)
+        }
         _ => of_tracker(layout, scoped),
     }
 }

@@ -4,12 +4,15 @@
 mod mapped;
 mod naming;
 mod rules;
+mod units;
 
-pub(crate) use naming::{JOINT, is_canonical, length_unit, reads_as_joint};
+pub(crate) use naming::{JOINT, is_canonical, is_text_column, length_unit, reads_as_joint};
 
 use crate::column_map::ColumnMap;
 use crate::error::{At, Placed, Problem};
 use crate::model::JointUnit;
+use crate::table::unit_row::{StatedUnit, UnitRow};
+use crate::units::TimeUnit;
 use std::collections::BTreeMap;
 
 /// What is known of the robot beside a table.
@@ -105,10 +108,11 @@ pub(super) struct Layout {
 }
 
 impl Layout {
-    /// Reads the header.
+    /// Reads the header, and the row of units below it. `dates`: the columns that hold dates, as far as they are known.
     pub(super) fn new(
         line: u64,
         names: Vec<String>,
+        (units, dates): (Option<&UnitRow>, &[bool]),
         (map, known): (Option<&ColumnMap>, Known<'_>),
     ) -> Placed<Layout> {
         let at = || At::Line(line);
@@ -122,9 +126,18 @@ impl Layout {
         if let Some(map) = map {
             mapped::apply(&mut layout, map, &mut mapped).map_err(|problem| (at(), problem))?;
         }
+        // A date is a time in seconds, whatever stands in the row of units.
+        let date = |i: usize| dates.get(i) == Some(&true);
+        let stated = |i: usize| match date(i) {
+            true => Some(StatedUnit::Time(TimeUnit::S)),
+            false => units.and_then(|row| row.units[i]),
+        };
         layout
-            .by_rules(&mapped, map.is_some(), known)
+            .by_rules(&mapped, map.is_some(), stated, known)
             .map_err(|problem| (at(), problem))?;
+        if let Some(row) = units {
+            layout.take_units(row, map)?;
+        }
         layout.name_poses();
         Ok(layout)
     }

@@ -1,7 +1,7 @@
 //! How column names read by our own rules.
 //!
 //! The rules, in this order:
-//! 1. `t_s`, `t_ms`, `t_us`: time. `host_s`: the recording computer's clock. `frame`, `pose`, `row`, `sample`, `index`, `config`: a counter.
+//! 1. `t_s`, `t_ms`, `t_us`, `t_ns`: time. `host_s`: the recording computer's clock. `frame`, `pose`, `row`, `sample`, `index`, `config`: a counter.
 //!    `trial`, `group`, `label`, `phase`, `set`, `hold`, `segment`, `note`: text.
 //! 2. `marker`, `point` or `body` as a column name: a long table; the row's `x_m,y_m,z_m[,qx,qy,qz,qw]` belong to the
 //!    marker or body named there. Without time its rows are put together by the counter, whose cells may be any text.
@@ -14,7 +14,9 @@
 //!
 //! Anything else has no meaning here.
 
+use crate::map_fault::angle_unit;
 use crate::model::{JointUnit, WHOLE_ROBOT};
+use crate::table::unit_row::StatedUnit;
 use crate::units::{AngleUnit, LengthUnit, TimeUnit};
 use calib_finding::nearest_word;
 
@@ -108,6 +110,7 @@ pub(super) fn meaning(name: &str) -> Meaning<'_> {
         "t_s" => return Meaning::Time(TimeUnit::S),
         "t_ms" => return Meaning::Time(TimeUnit::Ms),
         "t_us" => return Meaning::Time(TimeUnit::Us),
+        "t_ns" => return Meaning::Time(TimeUnit::Ns),
         "host_s" => return Meaning::Received,
         TEMPERATURE => return Meaning::Temperature(WHOLE_ROBOT),
         "marker" | "body" | "point" => return Meaning::Entity,
@@ -196,6 +199,12 @@ pub(super) fn nearest_rule(name: &str) -> Option<String> {
     {
         return Some(format!("{head}_{unit}"));
     }
+    if is_time_word(name) {
+        // Whole seconds beside the parts of a second are no time alone.
+        let mut words = name.split(|c: char| !c.is_alphanumeric());
+        let parts = words.any(|w| matches!(w, "sec" | "secs" | "nsec" | "nsecs" | "nanosec"));
+        return (!parts).then(|| "t_s".to_owned());
+    }
     let fixed = COUNTERS.iter().chain(&LABELS).copied().chain([
         "t_s",
         "t_ms",
@@ -210,6 +219,62 @@ pub(super) fn nearest_rule(name: &str) -> Option<String> {
     nearest_word(name, fixed)
         .map(str::to_owned)
         .or_else(|| Some(format!("{name}_rad")))
+}
+
+/// Whether texts stand in a column of this name.
+pub(crate) fn is_text_column(name: &str) -> bool {
+    matches!(
+        meaning(name),
+        Meaning::Label | Meaning::Entity | Meaning::Counter
+    )
+}
+
+/// The unit at the end of a column's name, where it is one of this kind: `deg` of `elbow_deg`.
+pub(super) fn unit_in_name(name: &str, of: StatedUnit) -> Option<StatedUnit> {
+    if let Some(unit) = StatedUnit::in_brackets(name) {
+        return Some(unit);
+    }
+    let (_, word) = name.rsplit_once('_')?;
+    match of {
+        StatedUnit::Angle(_) => angle_unit(name).map(StatedUnit::Angle),
+        StatedUnit::Length(_) => length_unit(name).map(|(_, unit)| StatedUnit::Length(unit)),
+        StatedUnit::Time(_) => TimeUnit::from_text(word).map(StatedUnit::Time),
+        StatedUnit::Torque => matches!(word, "nm" | "Nm").then_some(StatedUnit::Torque),
+        StatedUnit::Celsius => (word == "c").then_some(StatedUnit::Celsius),
+        StatedUnit::Other => None,
+    }
+}
+
+/// A column's name with the unit that a row of units states, where the name alone has no meaning.
+pub(super) fn with_unit(name: &str, unit: Option<StatedUnit>) -> String {
+    let Some(word) = unit.and_then(StatedUnit::name) else {
+        return name.to_owned();
+    };
+    match meaning(name) {
+        Meaning::Unknown if matches!(unit, Some(StatedUnit::Time(_))) && is_time_word(name) => {
+            format!("t_{word}")
+        }
+        Meaning::Unknown if !name.is_empty() => format!("{name}_{word}"),
+        _ => name.to_owned(),
+    }
+}
+
+/// Whether a name says that the column holds times: `Timestamp`, `time (UTC)`, `rec_time`.
+fn is_time_word(name: &str) -> bool {
+    const WORDS: [&str; 10] = [
+        "t",
+        "time",
+        "timestamp",
+        "stamp",
+        "date",
+        "datetime",
+        "zeit",
+        "zeitstempel",
+        "datum",
+        "temps",
+    ];
+    let mut words = name.split(|c: char| !c.is_alphanumeric());
+    words.any(|one| WORDS.iter().any(|word| one.eq_ignore_ascii_case(word)))
 }
 
 /// Whether a header line reads as one of our own tables (for the detection of formats).

@@ -1,10 +1,11 @@
 //! The columns that no map names, by the rules of [`naming`](super::naming). A name without meaning is an error, or
 //! with a column map: ignored, and listed.
 
-use super::naming::{Meaning, Part, meaning, nearest_rule};
+use super::naming::{Meaning, Part, meaning, nearest_rule, with_unit};
 use super::{BodyPlan, Column, Known, Layout, MarkerPlan, Rotation, SlotKind};
 use crate::error::Problem;
 use crate::model::JointUnit;
+use crate::table::unit_row::StatedUnit;
 use std::collections::BTreeMap;
 
 const EXPECTED: &str = "`<joint>_rad|_deg|_m|_mm`, `<joint>_nm`, `temperature_c`, `<marker>.x_m|.x_mm`, `<body>.qx`, `t_s`, `frame` or `trial`; or a column map in the profile";
@@ -70,15 +71,25 @@ fn of_joint<'n>(column: &'n str, joints: &[&str]) -> Option<Meaning<'n>> {
     })
 }
 
+fn unknown(name: &str) -> Problem {
+    Problem::UnknownColumn {
+        name: name.to_owned(),
+        expected: EXPECTED.to_owned(),
+        nearest: nearest_rule(name),
+    }
+}
+
 impl Layout {
-    /// The columns that are not mapped, by our rules; `lenient`: unknown ones are ignored.
+    /// The columns that are not mapped, by our rules; `lenient`: unknown ones are ignored. `stated`: the unit that a row of units gives a column.
     pub(super) fn by_rules(
         &mut self,
         mapped: &[bool],
         lenient: bool,
+        stated: impl Fn(usize) -> Option<StatedUnit>,
         known: Known<'_>,
     ) -> Result<(), Problem> {
-        let names = self.names.clone();
+        let names = self.names.iter().enumerate();
+        let names: Vec<String> = names.map(|(i, name)| with_unit(name, stated(i))).collect();
         let mut entities: BTreeMap<&str, Entity> = BTreeMap::new();
         let mut ignored = Vec::new();
         // A column `point` beside named markers is somebody's remark.
@@ -139,16 +150,13 @@ impl Layout {
                 | Meaning::Counter
                 | Meaning::Entity
                 | Meaning::Unknown => {
-                    if !lenient && !name.is_empty() {
-                        return Err(Problem::UnknownColumn {
-                            name: name.clone(),
-                            expected: EXPECTED.to_string(),
-                            nearest: nearest_rule(name),
-                        });
+                    // A speed or a current is not read, and says so.
+                    let other = stated(i) == Some(StatedUnit::Other);
+                    let own = &self.names[i];
+                    if !lenient && !other && !name.is_empty() {
+                        return Err(unknown(own));
                     }
-                    if !name.is_empty() {
-                        ignored.push(name.as_str());
-                    }
+                    ignored.extend((!name.is_empty()).then(|| own.clone()));
                 }
             }
         }

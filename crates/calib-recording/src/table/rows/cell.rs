@@ -1,8 +1,9 @@
 //! Cells that hold no plain number.
 
 use super::Rows;
-use crate::error::Placed;
-use crate::table::header::SlotKind;
+use crate::date_time::date_time;
+use crate::error::{Placed, Problem, excerpt};
+use crate::table::header::{Column, SlotKind};
 use crate::text::{Number, not_a_number, number};
 
 impl Rows<'_> {
@@ -34,6 +35,9 @@ impl Rows<'_> {
             }
             kind => kind,
         };
+        if kind == Number::Text && self.layout.slots[slot].kind == SlotKind::Time {
+            return self.instant_of_text(line, column, cell);
+        }
         if kind == Number::Nan && self.layout.slots[slot].kind == SlotKind::Tracker {
             let rows = self
                 .nans
@@ -48,5 +52,30 @@ impl Rows<'_> {
             "a number, or nothing where the sample was lost (a column map can name a text for that: `columns: {lost: [TEXT]}`)"
         };
         Err((self.at(line, column), not_a_number(cell, kind, expected)))
+    }
+
+    /// A date with a time of day, in the unit of the column.
+    fn instant_of_text(&mut self, line: u64, column: usize, cell: &str) -> Placed<f64> {
+        let at = self.at(line, column);
+        let found = excerpt(cell, 40);
+        let Some(instant) = date_time(cell) else {
+            return Err((at, Problem::TimeText { found }));
+        };
+        let before = match self.dates.get(&column) {
+            None if self.timeline.rows.is_empty() => None,
+            None => Some("numbers"),
+            Some(zoned) if *zoned == instant.zoned => None,
+            Some(true) => Some("an offset from UTC"),
+            Some(false) => Some("no offset from UTC"),
+        };
+        if let Some(before) = before {
+            return Err((at, Problem::OtherTime { found, before }));
+        }
+        self.dates.insert(column, instant.zoned);
+        let scale = match self.layout.columns[column] {
+            Column::Number { scale, .. } => scale,
+            _ => 1.0,
+        };
+        Ok(instant.seconds * scale)
     }
 }

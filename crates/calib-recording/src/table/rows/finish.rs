@@ -30,6 +30,13 @@ impl Rows<'_> {
                 .for_each(|stream| stream.resize(n, None));
         }
         let mut findings = self.findings();
+        for (column, zoned) in &self.dates {
+            let name = &self.layout.names[*column];
+            let of = if *zoned { "" } else { ", taken as UTC" };
+            self.layout
+                .conversions
+                .push(format!("dates of `{name}`{of} as seconds since 1970"));
+        }
         let timed = self.layout.time.is_some();
         self.timeline.clock = if timed { "t_s" } else { "static poses" }.to_string();
         self.timeline.t = timed.then_some(self.times);
@@ -74,6 +81,7 @@ impl Rows<'_> {
         }
         Ok(Recording {
             meta: Meta {
+                joint_columns: self.layout.joint_columns(),
                 conversions: self.layout.conversions,
                 findings,
                 ..Meta::default()

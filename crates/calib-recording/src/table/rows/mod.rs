@@ -56,6 +56,8 @@ pub(super) struct Rows<'a> {
     zeros: BTreeMap<String, Vec<u64>>,
     placeholders: Placeholders,
     nans: BTreeMap<String, Vec<u64>>,
+    /// Columns whose times are dates, and whether these state their offset from UTC.
+    dates: BTreeMap<usize, bool>,
 }
 
 #[derive(Clone, Copy, PartialEq)]
@@ -93,6 +95,7 @@ impl<'a> Rows<'a> {
             zeros: BTreeMap::new(),
             placeholders: Placeholders::default(),
             nans: BTreeMap::new(),
+            dates: BTreeMap::new(),
             layout,
             separator,
             map,

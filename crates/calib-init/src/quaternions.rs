@@ -1,0 +1,58 @@
+//! Quaternions whose columns are in another order than their names say: the column map lists them in the order of the file.
+
+use calib_checks::structural::PoseMistake;
+use calib_recording::{BodyColumns, ColumnMap};
+use calib_urdf::RobotModel;
+
+use crate::columns;
+use crate::header::header;
+use crate::source::Source;
+
+/// The map with the quaternions of these bodies, by their names in the profile, in the other order; `None` where their columns are not found.
+pub fn reordered(
+    model: &RobotModel,
+    source: &Source,
+    bodies: &[&String],
+    mistake: PoseMistake,
+) -> Option<ColumnMap> {
+    let mut map = source.columns.clone().unwrap_or_default();
+    let alone = source.recording.bodies.len() == 1;
+    for body in bodies {
+        let name = source.name_in_file(body);
+        let mut columns = match map.bodies.get(name) {
+            Some(columns) => columns.clone(),
+            // By the readers' own rules; a header that is not read any more has other names.
+            None if map.names.is_empty() => of_header(model, source, name, alone)?,
+            None => return None,
+        };
+        swap(&mut columns, mistake)?;
+        map.bodies.insert(name.to_owned(), columns);
+    }
+    Some(map)
+}
+
+/// The columns of a body of the file; `alone`: the only one, which may have no name.
+fn of_header(model: &RobotModel, source: &Source, name: &str, alone: bool) -> Option<BodyColumns> {
+    let mut bodies = columns::guess(model, &header(&source.file.bytes)?)
+        .map
+        .bodies;
+    if let Some(columns) = bodies.remove(name) {
+        return Some(columns);
+    }
+    let (_, columns) = bodies.pop_first()?;
+    (alone && bodies.is_empty()).then_some(columns)
+}
+
+/// The same four columns, in the order of the file, under the other key.
+fn swap(columns: &mut BodyColumns, mistake: PoseMistake) -> Option<()> {
+    match mistake {
+        PoseMistake::ScalarFirstReadAsLast => {
+            columns.quaternion_wxyz = Some(columns.quaternion_xyzw.take()?);
+        }
+        PoseMistake::ScalarLastReadAsFirst => {
+            columns.quaternion_xyzw = Some(columns.quaternion_wxyz.take()?);
+        }
+        _ => return None,
+    }
+    Some(())
+}
