@@ -3,6 +3,7 @@
 mod header;
 mod read;
 mod rows;
+mod stated_unit;
 mod unit_row;
 mod write;
 mod write_mapped;
@@ -11,6 +12,7 @@ pub(crate) use header::{Known, is_canonical, length_unit};
 pub use read::WRITTEN_LIVE;
 pub(crate) use read::read_table;
 pub(crate) use rows::UNIT_TOLERANCE;
-pub use unit_row::{StatedUnit, UnitRow, unit_row};
+pub use stated_unit::{StatedUnit, UnitRow};
+pub use unit_row::unit_row;
 pub use write::{NotWritten, WriteOptions, joint_column, write_poses, write_recording};
 pub use write_mapped::write_mapped;

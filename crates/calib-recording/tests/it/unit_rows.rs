@@ -21,7 +21,7 @@ fn refused(text: impl AsRef<[u8]>, columns: Option<ColumnMap>) -> String {
     }
 }
 
-/// Half a turn of `elbow`, 0.25 m of `lift`, the marker `tip` at (1, 2, 3) m, in two rows 0.5 s apart.
+/// 180° of `elbow`, 0.25 m of `lift`, the marker `tip` at (1, 2, 3) m, in two rows 0.5 s apart.
 fn is_as_stated(poses: &Poses) {
     assert_eq!(poses.joints["elbow"][0], Some(std::f64::consts::PI));
     assert_eq!(poses.joints["lift"][0], Some(0.25));

@@ -11,7 +11,7 @@ pub(crate) use naming::{JOINT, is_canonical, is_text_column, length_unit, reads_
 use crate::column_map::ColumnMap;
 use crate::error::{At, Placed, Problem};
 use crate::model::JointUnit;
-use crate::table::unit_row::{StatedUnit, UnitRow};
+use crate::table::stated_unit::{StatedUnit, UnitRow};
 use crate::units::TimeUnit;
 use std::collections::BTreeMap;
 

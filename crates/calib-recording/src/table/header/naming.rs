@@ -16,7 +16,7 @@
 
 use crate::map_fault::angle_unit;
 use crate::model::{JointUnit, WHOLE_ROBOT};
-use crate::table::unit_row::StatedUnit;
+use crate::table::stated_unit::StatedUnit;
 use crate::units::{AngleUnit, LengthUnit, TimeUnit};
 use calib_finding::nearest_word;
 

@@ -5,7 +5,7 @@ use super::naming::{Meaning, Part, meaning, nearest_rule, with_unit};
 use super::{BodyPlan, Column, Known, Layout, MarkerPlan, Rotation, SlotKind};
 use crate::error::Problem;
 use crate::model::JointUnit;
-use crate::table::unit_row::StatedUnit;
+use crate::table::stated_unit::StatedUnit;
 use std::collections::BTreeMap;
 
 const EXPECTED: &str = "`<joint>_rad|_deg|_m|_mm`, `<joint>_nm`, `temperature_c`, `<marker>.x_m|.x_mm`, `<body>.qx`, `t_s`, `frame` or `trial`; or a column map in the profile";

@@ -5,7 +5,7 @@ use super::{Column, Layout, Rotation};
 use crate::column_map::ColumnMap;
 use crate::error::{Against, At, Placed, Problem};
 use crate::model::{JointColumn, JointUnit};
-use crate::table::unit_row::{StatedUnit, UnitRow};
+use crate::table::stated_unit::{StatedUnit, UnitRow};
 use crate::units::{AngleUnit, LengthUnit, TimeUnit};
 use std::collections::BTreeMap;
 
