@@ -170,3 +170,57 @@ fn the_body_that_a_controller_computed_is_named() {
         }
     }
 }
+
+/// A marker behind a single joint moves on a circle, whatever the robot is: it fits as closely as a precise tracker measures, and was measured.
+#[test]
+fn a_body_behind_one_joint_that_a_precise_tracker_saw_is_a_measurement() {
+    const PRECISE: f64 = 1e-5;
+    let robot = RobotModel::from_urdf_text(&arm(2e-3, 21), "arm").expect("an arm");
+    let [first, last] = ["l1", "l6"].map(|link| robot.link_id(link).expect("there"));
+    let table = |n: usize, seed: u64| {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let mut text = "j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg".to_owned();
+        for name in ["b", "t_1", "t_2", "t_3", "t_4"] {
+            text += &format!(",{name}.x_mm,{name}.y_mm,{name}.z_mm");
+        }
+        for _ in 0..n {
+            let q: Vec<f64> = (0..6).map(|_| rng.random_range(-1.5..1.5)).collect();
+            let mut cells: Vec<String> =
+                q.iter().map(|q| format!("{:.9}", q.to_degrees())).collect();
+            let on = [first, last, last, last, last];
+            for (link, marker) in on.iter().zip([[0.2, 0.1, 0.0]].iter().chain(&TOOL)) {
+                let place = robot.root_from_link(&q, *link) * Point3::from(*marker);
+                cells.extend(place.iter().map(|v| {
+                    let n: f64 = StandardNormal.sample(&mut rng);
+                    format!("{:.6}", (v + PRECISE * n) * 1e3)
+                }));
+            }
+            text += "\n";
+            text += &cells.join(",");
+        }
+        text + "\n"
+    };
+    let (_, rest) = PROFILE.split_once("solve:").expect("a block");
+    let profile = format!(
+        "calib: 1\nrobot: {{name: arm, urdf: arm.urdf}}\ntracker: {{frame: lab}}\nbodies:\n  tool: {{link: l6, markers: [t_1, t_2, t_3, t_4]}}\n  \
+         base: {{link: l1, markers: [b]}}\nrecordings:\n  poses: {{file: poses.csv, use: static}}\n  checks: {{file: checks.csv, use: validation}}\nsolve:{rest}"
+    );
+    let dir = Scratch::new()
+        .file("arm.urdf", arm(0.0, 0))
+        .file("poses.csv", table(40, 31))
+        .file("checks.csv", table(12, 32))
+        .file("arm.yaml", &profile);
+    let checked = dir.calib(["check", "arm.yaml"]);
+    assert_eq!(checked.code, 0, "{}", checked.stdout);
+    let said = dir.calib([
+        "init",
+        "arm.urdf",
+        "poses.csv",
+        "checks.csv",
+        "-o",
+        "first.yaml",
+    ]);
+    assert!(!said.words().contains("left out"), "{}", said.words());
+    let ran = dir.calib(["run", "arm.yaml", "--out", "out"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.stdout, ran.stderr);
+}

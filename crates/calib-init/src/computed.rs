@@ -1,6 +1,7 @@
 //! Bodies whose coordinates a controller computed from its joints: no measurement.
 
 use calib_checks::structural::Chain;
+use calib_recording::Poses;
 
 use crate::bodies::Found;
 use crate::fact::{About, Fact, Place};
@@ -9,11 +10,15 @@ use crate::source::Source;
 
 /// What is written with one decimal of a millimeter, m, and joints with two of a degree.
 const COMPUTED: f64 = 1e-4;
+/// No tracker resolves less, m: the limit where no body shows the noise.
+const RESOLVED: f64 = 3e-6;
+/// Rows that leave a residual of a point on a link: 3 coordinates each, for a frame and the point.
+const ROWS: usize = 8;
 /// What a body that moves leaves on the root, m.
 const MOVED: f64 = 0.01;
-/// Part of the noise that was found: of as many coordinates as there are, none scatters so little by chance.
+/// Part of the noise that the markers show: of as many coordinates as there are, none scatters so little by chance.
 const OF_NOISE: f64 = 0.3;
-/// Part of what another body leaves.
+/// The same of a pose, which a tracker computes from many markers, and part of what another body leaves.
 const BELOW: f64 = 0.1;
 
 /// Bodies from `fixed` on that follow the nominal robot closer than the tracker's noise, m, lets any measured body, while another one shows that the robot
@@ -30,7 +35,14 @@ pub fn computed(
         let of = |marker: &String| maps().find_map(|map| map.markers.get(marker));
         markers.iter().filter_map(of).flatten().cloned().collect()
     };
-    let limit = COMPUTED.min(OF_NOISE * noise.unwrap_or(f64::INFINITY));
+    let limit = |of: &Found| {
+        let part = if of.markers.is_empty() {
+            BELOW
+        } else {
+            OF_NOISE
+        };
+        noise.map_or(RESOLVED, |noise| COMPUTED.min(part * noise))
+    };
     let count = scene.bodies.len();
     let Ok(chain) = Chain::from_model(scene.model) else {
         return Vec::new();
@@ -40,6 +52,9 @@ pub fn computed(
     }
     let rms: Vec<Option<f64>> = (0..count)
         .map(|body| {
+            if rows(scene, &scene.bodies[body]) < ROWS {
+                return None;
+            }
             let choice = scene.choose(&chain, body)?;
             // One that hardly moves does not show what it follows.
             let of_root = choice
@@ -52,11 +67,11 @@ pub fn computed(
         })
         .collect();
     let found = (fixed..count).filter_map(|body| {
-        let own = rms[body].filter(|rms| *rms < limit)?;
+        let one = &scene.bodies[body];
+        let own = rms[body].filter(|rms| *rms < limit(one))?;
         let others = (0..count).filter(|other| *other != body);
         let others = others.filter_map(|other| Some((other, rms[other]?)));
         let (other, next) = others.max_by(|a, b| a.1.total_cmp(&b.1))?;
-        let one = &scene.bodies[body];
         let about = About::Computed {
             body: one.name.clone(),
             columns: columns(&one.markers),
@@ -67,6 +82,21 @@ pub fn computed(
         (own < BELOW * next).then(|| (body, Fact::new(Place::Recordings, about)))
     });
     found.collect()
+}
+
+/// Rows that show a body, all tables together.
+fn rows(scene: &Scene<'_>, body: &Found) -> usize {
+    let of = |poses: &Poses| match body.markers.first() {
+        Some(marker) => poses
+            .markers
+            .get(marker)
+            .map_or(0, |track| track.iter().flatten().count()),
+        None => poses
+            .bodies
+            .get(&body.name)
+            .map_or(0, |track| track.iter().flatten().count()),
+    };
+    scene.tables.iter().map(of).sum()
 }
 
 /// Forgets these bodies, and what was said of them.
@@ -81,7 +111,10 @@ pub fn leave_out(
         of_bodies.retain(|fact| fact.place != place);
         of_bodies.push(fact);
     }
-    // What stands beside such a position in the file needs no quaternion.
+    // What stands beside such a position in the file needs no quaternion; beside another point it may be the orientation of that one.
+    if found.iter().any(|body| body.markers.len() == 1) {
+        return;
+    }
     for fact in of_files {
         if let About::Ignored { orientation, .. } = &mut fact.about {
             orientation.clear();

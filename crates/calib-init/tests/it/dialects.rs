@@ -1,13 +1,13 @@
 //! Tables in dialects of spreadsheets and loggers: a row of units, a stated separator, UTF-16, quaternions in another order than their names say.
 
 use calib_init::mistake::Mistake;
-use calib_init::{About, File, Proposal, write};
+use calib_init::{About, File, write};
 use calib_recording::LengthUnit;
 use calib_sim::Motion;
 
 use crate::lab::{
-    Design, Kind, arm, file, link_of, proposed, recordings, request, streams, text, with_cells,
-    with_names,
+    Design, Kind, arm, assert_read, corrected, file, link_of, proposed, recordings, request,
+    streams, text, with_cells, with_names,
 };
 
 /// The robot stops again and again.
@@ -39,26 +39,6 @@ fn with_unit_row(table: &str, name: impl Fn(&str) -> String, angle: &str) -> Str
     format!("{}\n{}\n{rows}", names.join(","), units.join(","))
 }
 
-fn is_right(proposal: &Proposal, what: &str) {
-    let sigma = proposal.noise.marker.expect("a scatter");
-    assert!((1e-4..4e-4).contains(&sigma), "{what}: {sigma}");
-    assert_eq!(link_of(proposal, "hand"), "link_6", "{what}");
-    let agrees = |f: &calib_init::Fact| matches!(f.about, About::Agrees { rms, .. } if rms < 8e-3);
-    assert!(
-        proposal.facts.iter().any(agrees),
-        "{what}: {:?}",
-        proposal.facts
-    );
-}
-
-fn corrected(proposal: &Proposal) -> Vec<&Mistake> {
-    let of = proposal.facts.iter().filter_map(|fact| match &fact.about {
-        About::Corrected { mistake, .. } => Some(mistake),
-        _ => None,
-    });
-    of.collect()
-}
-
 #[test]
 fn a_row_of_units_is_read_and_corrected() {
     let good = recordings(&HAND, Design::Random, 81);
@@ -76,12 +56,12 @@ fn a_row_of_units_is_read_and_corrected() {
         ),
     ] {
         let proposal = proposed(&[file("poses", given)]);
-        is_right(&proposal, what);
+        assert_read(&proposal, what);
         assert!(corrected(&proposal).is_empty(), "{what}");
     }
     // The row states the wrong unit.
     let proposal = proposed(&[file("poses", with_unit_row(&table, own, "rad"))]);
-    is_right(&proposal, "rad");
+    assert_read(&proposal, "rad");
     let units = [&Mistake::Unit {
         joint: None,
         unit: "deg",
@@ -117,7 +97,7 @@ fn a_stated_separator_and_utf_16_are_read() {
             bytes,
             ..file("poses", "")
         };
-        is_right(&proposed(&[given]), "spreadsheet");
+        assert_read(&proposed(&[given]), "spreadsheet");
     }
 }
 
@@ -194,7 +174,7 @@ fn dates_of_two_files_are_times_of_one_clock() {
         let proposal = proposed(&given);
         assert_eq!(proposal.recordings.len(), 1);
         assert!(proposal.recordings[0].stream.is_some() && proposal.recordings[0].log.is_some());
-        is_right(&proposal, zone);
+        assert_read(&proposal, zone);
         assert!(
             !proposal
                 .facts
@@ -240,7 +220,7 @@ fn rostopic_names_its_joints_in_cells() {
         file("run_tracker", text(&two.tracker)),
         file("run_robot", table),
     ]);
-    is_right(&proposal, "rostopic");
+    assert_read(&proposal, "rostopic");
     assert!(corrected(&proposal).is_empty(), "{:?}", proposal.facts);
     let profile = write::profile(&arm(), &proposal);
     assert!(profile.contains("joint_4: field.position1"), "{profile}");

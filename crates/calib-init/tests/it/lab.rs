@@ -3,7 +3,8 @@
 use std::collections::BTreeMap;
 use std::fmt::Write as _;
 
-use calib_init::{File, Proposal, Request, propose};
+use calib_init::mistake::Mistake;
+use calib_init::{About, Fact, File, Proposal, Request, propose};
 use calib_profile::Profile;
 use calib_recording::{Poses, WriteOptions, write_poses};
 use calib_sim::{Motion, StreamPlan, Streams, simulate, simulate_streams};
@@ -256,4 +257,26 @@ pub fn with_names(table: &str, name: impl Fn(&str) -> String) -> String {
         .chain(body[1..].iter().map(|l| (*l).to_owned()))
         .map(|line| line + "\n")
         .collect()
+}
+
+/// The markers' scatter, which no wrong unit leaves as it is, and the link.
+pub fn assert_read(proposal: &Proposal, what: &str) {
+    let sigma = proposal.noise.marker.expect("a scatter");
+    assert!((1e-4..4e-4).contains(&sigma), "{what}: {sigma}");
+    assert_eq!(link_of(proposal, "hand"), "link_6", "{what}");
+    let agrees = |f: &Fact| matches!(f.about, About::Agrees { rms, .. } if rms < 8e-3);
+    assert!(
+        proposal.facts.iter().any(agrees),
+        "{what}: {:?}",
+        proposal.facts
+    );
+}
+
+/// The mistakes that were corrected.
+pub fn corrected(proposal: &Proposal) -> Vec<&Mistake> {
+    let of = proposal.facts.iter().filter_map(|fact| match &fact.about {
+        About::Corrected { mistake, .. } => Some(mistake),
+        _ => None,
+    });
+    of.collect()
 }

@@ -6,8 +6,8 @@ use calib_recording::LengthUnit;
 use calib_urdf::RobotModel;
 
 use crate::lab::{
-    Design, Kind, URDF, arm, file, link_of, proposed, recordings, request, text, with_cells,
-    with_names,
+    Design, Kind, URDF, arm, assert_read, corrected, file, proposed, recordings, request, text,
+    with_cells, with_names,
 };
 
 const HAND: [(&str, &str, Kind); 1] = [("hand", "flange", Kind::Markers(4))];
@@ -29,27 +29,6 @@ fn in_unit(table: &str, unit: LengthUnit, name: impl Fn(&str) -> String) -> Stri
             false => bare.to_owned(),
         }
     })
-}
-
-/// The markers' scatter, which no wrong unit leaves as it is, and the link.
-fn assert_read(proposal: &Proposal, what: &str) {
-    let sigma = proposal.noise.marker.expect("a scatter");
-    assert!((1e-4..4e-4).contains(&sigma), "{what}: {sigma}");
-    assert_eq!(link_of(proposal, "hand"), "link_6", "{what}");
-    let agrees = |f: &calib_init::Fact| matches!(f.about, About::Agrees { rms, .. } if rms < 8e-3);
-    assert!(
-        proposal.facts.iter().any(agrees),
-        "{what}: {:?}",
-        proposal.facts
-    );
-}
-
-fn corrected(proposal: &Proposal) -> Vec<&Mistake> {
-    let of = proposal.facts.iter().filter_map(|fact| match &fact.about {
-        About::Corrected { mistake, .. } => Some(mistake),
-        _ => None,
-    });
-    of.collect()
 }
 
 #[test]

@@ -1,10 +1,13 @@
 //! Bodies that are not measured as the others are: computed from the joints, or seen in another frame.
 
+use std::collections::BTreeMap;
+
 use calib_checks::structural::{Measured, Outcome, registration_residual};
 use calib_finding::{Fact, Finding, Subject, catalog};
 
 use super::layout::Layout;
 use super::without::DIVIDED;
+use crate::prepare::tracks::BodyTrack;
 
 /// Rows that leave a residual of a point on a link: 3 coordinates each, for a frame and the point.
 const ROWS: usize = 8;
@@ -21,16 +24,20 @@ pub(super) struct Alone {
     beside: (usize, f64),
 }
 
-/// Bodies that follow the nominal robot closer than the tracker's noise `sigma`, m, lets any measured body, while another one shows that the robot is not
-/// that close to its drawing.
-pub(super) fn computed(layout: &Layout<'_>, sigma: f64) -> Vec<Alone> {
+/// Bodies that follow the nominal robot closer than the tracker's noise lets any measured body, while another one shows that the robot is not that close to
+/// its drawing. The noise is what the markers of the other bodies show, not what is stated: a body on a single joint fits any robot as closely as a good
+/// tracker measures.
+pub(super) fn computed(layout: &Layout<'_>, tracks: &BTreeMap<String, BodyTrack>) -> Vec<Alone> {
     /// m: what is written with two decimals of a millimeter, and joints with three of a degree.
     const COMPUTED: f64 = 5e-5;
     /// Part of the noise, and of what another body leaves.
     const BELOW: f64 = 0.1;
-    let limit = COMPUTED.min(BELOW * sigma);
     let alone = alone(layout);
     let found = alone.iter().enumerate().filter_map(|(body, rms)| {
+        let others = layout.bodies.iter().filter(|b| **b != layout.bodies[body]);
+        let noise = others.filter_map(|other| tracks[*other].marker_sigma);
+        let noise = noise.min_by(f64::total_cmp);
+        let limit = noise.map_or(super::COMPUTED, |noise| COMPUTED.min(BELOW * noise));
         let rms = rms.filter(|rms| *rms < limit)?;
         let others = alone.iter().enumerate().filter(|(b, _)| *b != body);
         let others = others.filter_map(|(b, rms)| Some((b, (*rms)?)));

@@ -36,6 +36,9 @@ pub use merge::keep_unexplained;
 /// expected ones (3°, 30 mm) reach it in 1 of 100 robots.
 const NOT_NOMINAL: f64 = 3.0;
 
+/// No tracker resolves less, m: three decimals of a millimeter are 0.5 µm.
+const COMPUTED: f64 = 3e-6;
+
 /// A mistake that divides the residual by 1.5 raised it by more than this.
 const RAISED: f64 = 1.1;
 
@@ -85,7 +88,7 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
     let prior = &inputs.robot.profile.solve.prior;
     options.prior_angle = options.prior_angle.max(prior.angle);
     options.prior_length = options.prior_length.max(prior.position);
-    let computed = bodies::computed(&layout, options.sigma);
+    let computed = bodies::computed(&layout, tracks);
     let of_bodies = computed.iter().map(|one| one.finding(&layout));
     found.findings.extend(of_bodies);
     layout.leave_out(&computed.iter().map(|one| one.body).collect());
@@ -126,8 +129,6 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
 
 /// A nominal robot that fits to less than any tracker resolves, and far less than the stated noise `sigma`, m, was not measured.
 fn not_measured(layout: &Layout<'_>, outcome: &Outcome, sigma: f64) -> Option<Finding> {
-    /// m: three decimals of a millimeter are 0.5 µm.
-    const COMPUTED: f64 = 3e-6;
     /// Part of the noise: of as many coordinates as there are, none scatters so little by chance.
     const BELOW: f64 = 0.1;
     /// Rows that leave a residual.
