@@ -16,6 +16,7 @@ mod default_run;
 mod designs;
 mod drift;
 mod effects;
+mod exchanged;
 mod facts;
 mod few_rows;
 mod fit;

@@ -9,8 +9,9 @@
 //! ```
 //!
 //! The angles alone do not tell an arm from its mirror image (one joint of three orthogonal ones with the other
-//! sign); the slide does. It is compared in units of the arm's size: `√(Δθ² + (Δd/L)²)`, L the
-//! median distance that the body moves.
+//! sign); the slide does. It is compared in units of how far the body moved: `√(Δθ² + (Δd/L)²)`, L the distance between
+//! the two poses, or the median distance of the body from the middle of its way where that is more. An error of an axis
+//! makes an error of the slide in proportion to the way.
 //!
 //! What this cannot see: a sign error of the only joint that moves (a mount turned by half a turn explains it), and
 //! links between which no joint moved.
@@ -70,10 +71,7 @@ fn pairs<'a>(
         .filter_map(move |(i, j)| {
             let measured = screw(&tracker_from_body[i]?, &tracker_from_body[j]?);
             let predicted = screw(&base_from_link[i], &base_from_link[j]);
-            let slides = measured.1.zip(predicted.1);
-            let slide = slides.map_or(0.0, |(a, b)| (a - b) / size);
-            (measured.0.max(predicted.0) > TURNED)
-                .then(|| (i, j, (measured.0 - predicted.0).hypot(slide)))
+            Some((i, j, measured.off(&predicted, size)?))
         })
 }
 
@@ -94,18 +92,40 @@ fn size(tracker_from_body: &[Option<Isometry3<f64>>]) -> f64 {
         .max(SMALLEST_SIZE)
 }
 
-/// Angle of the motion from `a` to `b`, rad, and its slide along the axis, m, where the axis is well defined.
-fn screw(a: &Isometry3<f64>, b: &Isometry3<f64>) -> (f64, Option<f64>) {
+/// A motion from one pose to another.
+struct Screw {
+    /// Angle, rad.
+    angle: f64,
+    /// Slide along the axis, m, where the axis is well defined.
+    slide: Option<f64>,
+    /// Distance between the poses, m.
+    distance: f64,
+}
+
+impl Screw {
+    /// By how much a motion is off the predicted one, (1), rad; `None` where neither turns.
+    fn off(&self, predicted: &Self, size: f64) -> Option<f64> {
+        let length = size.max(self.distance);
+        let slides = self.slide.zip(predicted.slide);
+        let slide = slides.map_or(0.0, |(a, b)| (a - b) / length);
+        let turned = self.angle.max(predicted.angle) > TURNED;
+        turned.then(|| (self.angle - predicted.angle).hypot(slide))
+    }
+}
+
+fn screw(a: &Isometry3<f64>, b: &Isometry3<f64>) -> Screw {
     let a_from_b = a.inverse() * b;
     let angle = a_from_b.rotation.angle();
     let axis = a_from_b
         .rotation
         .axis()
         .filter(|_| WELL_TURNED.contains(&angle));
-    (
+    let moved = a_from_b.translation.vector;
+    Screw {
         angle,
-        axis.map(|axis| a_from_b.translation.vector.dot(&axis)),
-    )
+        slide: axis.map(|axis| moved.dot(&axis)),
+        distance: moved.norm(),
+    }
 }
 
 /// Whether the tracker's up axis can be the one declared (`+Z`, `-Y`, …): the robot's base stands upright to within
@@ -266,9 +286,7 @@ impl Spoiled {
         let off = others.filter_map(|&other| {
             let measured = screw(seen, tracker_from_body[other].as_ref()?);
             let predicted = screw(base_from_link_there, &base_from_link[other]);
-            let slide = measured.1.zip(predicted.1);
-            let slide = slide.map_or(0.0, |(a, b)| (a - b) / size);
-            (measured.0.max(predicted.0) > TURNED).then(|| (measured.0 - predicted.0).hypot(slide))
+            measured.off(&predicted, size)
         });
         median(off.collect())
     }

@@ -1,4 +1,4 @@
-//! Did the tracker, a body on its link or the zero of a joint move at one row, and too far for a fit to find it?
+//! Did the tracker, a body on its link or the zero of a joint move at one row, and too far for a fit to find it? Or were two bodies exchanged there?
 //!
 //! Asked where the data disagree with the robot and nothing is named. Sums over rows add up, so every place at which a recording
 //! may be cut costs two registrations: of the rows before and of those after, with a tracker and markers of their own,
@@ -17,6 +17,7 @@ use rayon::prelude::*;
 use serde::Serialize;
 
 use super::apply::apply;
+use super::correct::same_shape;
 use super::data::Data;
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{BodyIndex, JointIndex, RecordingIndex};
@@ -36,6 +37,8 @@ const STEP: (f64, f64) = (0.01, 0.005);
 const REFINEMENTS: usize = 4;
 /// Index of the rows after the change, where those before have 0.
 const AFTER: Scope = Scope::Recording(RecordingIndex(1));
+/// The rows before.
+const BEFORE: Scope = Scope::Recording(RecordingIndex(0));
 
 /// What moved.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -46,6 +49,15 @@ pub enum Moved {
     Body(BodyIndex),
     /// The zero of a joint.
     Joint(JointIndex),
+    /// Nothing: two bodies have each other's names on one side.
+    Names {
+        /// The smaller index.
+        first: BodyIndex,
+        /// The larger index.
+        second: BodyIndex,
+        /// From the row on, or up to it.
+        after: bool,
+    },
 }
 
 /// How far it moved.
@@ -192,7 +204,10 @@ fn moved_at(data: &Data, cut: &Cut, outcome: &Outcome, options: &Options) -> Opt
         .collect();
     let bodies = (0..data.bodies.len()).map(|b| Moved::Body(BodyIndex(b)));
     let joints = outcome.design.moving.iter().map(|j| Moved::Joint(*j));
-    let things = std::iter::once(Moved::Tracker).chain(bodies).chain(joints);
+    let things = std::iter::once(Moved::Tracker)
+        .chain(bodies)
+        .chain(joints)
+        .chain(names(data));
     let at = |after: usize, things: Vec<Moved>| -> Vec<(Moved, f64, Size)> {
         let grouped = grouped(data, cut, after);
         let each = things.into_par_iter().map(|moved| {
@@ -200,6 +215,11 @@ fn moved_at(data: &Data, cut: &Cut, outcome: &Outcome, options: &Options) -> Opt
                 Moved::Tracker => tracker(&grouped),
                 Moved::Body(body) => remounted(&grouped, body),
                 Moved::Joint(joint) => zero(&grouped, joint),
+                Moved::Names {
+                    first,
+                    second,
+                    after,
+                } => exchanged(&grouped, (first, second), after),
             };
             (moved, rms, size)
         });
@@ -234,6 +254,23 @@ fn moved_at(data: &Data, cut: &Cut, outcome: &Outcome, options: &Options) -> Opt
     })
 }
 
+/// Pairs of bodies whose samples could have been exchanged, on either side.
+fn names(data: &Data) -> Vec<Moved> {
+    let mut names = Vec::new();
+    for (a, body) in data.bodies.iter().enumerate() {
+        for (b, other) in data.bodies.iter().enumerate().skip(a + 1) {
+            if same_shape(body, other) {
+                names.extend([true, false].map(|after| Moved::Names {
+                    first: BodyIndex(a),
+                    second: BodyIndex(b),
+                    after,
+                }));
+            }
+        }
+    }
+    names
+}
+
 /// The rows before a change as recording 0, those from row `after` of the cut recording on, and of later ones, as [`AFTER`].
 fn grouped(data: &Data, cut: &Cut, after: usize) -> Data {
     let mut grouped = data.clone();
@@ -259,6 +296,16 @@ fn tracker(grouped: &Data) -> (f64, Size) {
         displacement(&back.inverse(), &Point3::from(root))
     });
     (fit.score.rms, size)
+}
+
+/// Two bodies were exchanged in the rows of [`AFTER`], or in those before: what is left.
+fn exchanged(grouped: &Data, (first, second): (BodyIndex, BodyIndex), after: bool) -> (f64, Size) {
+    let exchanged = Scoped {
+        hypothesis: Hypothesis::ExchangedBodies { first, second },
+        scope: if after { AFTER } else { BEFORE },
+    };
+    let rms = Scan::new(&apply(&exchanged, grouped), &[]).none().rms;
+    (rms, Size::default())
 }
 
 /// A body moved on its link before the rows of [`AFTER`]: what is left, and how far.

@@ -48,6 +48,12 @@ super::topic! {
         "rows": Warning,
             "{rows:row} had exchanged labels, corrected by the distances between the markers: {exchanges}.",
             "Place the markers at clearly different distances before the next recording. This recording needs nothing.";
+        "bodies_in_rows": Warning,
+            "Bodies `{first}` and `{second}` have each other's labels in {rows:row}: each has there the shape that the other has elsewhere. This was corrected.",
+            "Correct the labels in the tracker's software, and give the bodies clearly different shapes before the next recording. This recording needs nothing.";
+        "markers_in_rows": Warning,
+            "Markers `{first}` and `{second}` have each other's labels in {rows:row}: exchanged, both bodies have the shape that they have elsewhere. This was corrected.",
+            "Correct the labels in the tracker's software. This recording needs nothing.";
         "between_bodies": Warning,
             "Markers `{first}` and `{second}` have each other's labels: the distances in their bodies change by {change}, and exchanged both are rigid. This was corrected.",
             "Correct the labels in the tracker's software, or state it in the profile where all recordings have them so: `names: {{first}: {second}, {second}: {first}}`.";
@@ -97,7 +103,7 @@ super::topic! {
             "The body rotates by more than {limit} between two rows, {count:time}; {usual} is usual.",
             "Drop the flipped rows, and move one marker: the marker pattern is nearly symmetric.";
         "model": Error,
-            "In {count:row} the body deviates from the robot's model by up to {worst}; {usual} is usual.",
+            "In {count:row} the body deviates from the robot's model by up to {position} and {angle}, {ratio} times the usual.",
             "Drop the flipped rows, and move one marker: the marker pattern is nearly symmetric.";
     }
 }

@@ -246,6 +246,12 @@ super::topic! {
     }
     /// Rows that no fit explains.
     ROW_OUTLIER = "row-outlier" {
+        "exchanged": Error,
+            "In {count:row} bodies `{first}` and `{second}` have each other's names: each is where the other should be.",
+            "Correct the names in these rows, or drop the rows. Give the bodies clearly different shapes before the next recording.";
+        "exchanged_few": Warning,
+            "In {count:row} bodies `{first}` and `{second}` have each other's names: each is where the other should be.",
+            "The robust fit leaves these rows out. Give the bodies clearly different shapes before the next recording.";
         "several_bodies": Error,
             "Several bodies disagree with the robot's model at once in {count:row}: their joint values are wrong, or the tracker's frame was off.",
             "Correct or drop these rows.";
@@ -256,7 +262,7 @@ super::topic! {
             "In {count:row} the body deviates by up to {position} and {angle}, {ratio} times the usual; no motion between rows explains it[[; an error of joint {joints:or} alone would]].",
             "Look at these rows: a wrong reading, or backlash of that joint. The robust fit leaves out what it cannot explain.";
         "model": Warning,
-            "In {count:row} the body deviates from the nominal robot by up to {position} and {worst}; {usual} is usual.",
+            "In {count:row} the body deviates from the nominal robot by up to {position} and {angle}, {ratio} times the usual.",
             "Look at these rows: a wrong reading of a joint or of the body. The robust fit leaves out what it cannot explain.";
     }
 }

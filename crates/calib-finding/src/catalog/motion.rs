@@ -28,7 +28,7 @@ super::topic! {
             "{restless} of {holds:hold} had not settled, too many to reject.[[ `{name}` drifts by {drift} at {time:s}.]][[ `{name}` scatters by {scatter}; {usual} is usual.]]",
             "Wait longer before each hold, or stiffen the robot's stand.";
         "model": Warning,
-            "In {count:row} the body deviates from the robot's model by up to {worst}; {usual} is usual.",
+            "In {count:row} the body deviates from the robot's model by up to {position} and {angle}, {ratio} times the usual.",
             "Drop these rows, or synchronize the clocks: the robot had not settled, or tracker and robot were read at different times.";
         "between": Warning,
             "In {count:row} the body deviates by up to {position} and {angle}; interpolating the joint values toward an adjacent row explains it ({fraction:percent} in the worst row).",

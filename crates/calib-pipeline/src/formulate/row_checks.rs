@@ -12,6 +12,7 @@ use calib_checks::structural::{Chain, Deviation, Hypothesis, apply_all, deviatio
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::Usage;
 use calib_urdf::LinkId;
+use nalgebra::Isometry3;
 use rayon::prelude::*;
 
 use crate::formulate::structural::{Layout, Structural, coupled};
@@ -33,6 +34,8 @@ const ON_THE_SPOT: f64 = 0.5;
 const SHRINKS: f64 = 0.8;
 /// Shortest part of the way that is tried.
 const SHORTEST: f64 = 0.004;
+/// Least of a usual disagreement, rad, that a ratio is formed with: data without noise have none.
+const SMALLEST: f64 = 1e-6;
 /// What a place on the way may leave of a row's disagreement.
 const LEFT: f64 = 0.3;
 
@@ -54,6 +57,8 @@ struct Row {
     off: f64,
     /// Of the markers from where they should be, rms, m.
     distance: f64,
+    /// Rotation against where the body should be, rad; 0 where it has no orientation.
+    angle: f64,
     kind: Kind,
 }
 
@@ -70,7 +75,7 @@ struct Rows<'a> {
 #[must_use]
 pub fn rows<'a>(
     inputs: &'a Inputs,
-    tracks: &BTreeMap<String, BodyTrack>,
+    tracks: &'a BTreeMap<String, BodyTrack>,
     structural: &Structural,
 ) -> Vec<Finding> {
     // A recording that a mistake explains as a whole has no deviating rows.
@@ -106,16 +111,19 @@ pub fn rows<'a>(
         (!spoiled.rows.is_empty()).then_some(Spoilt {
             body,
             loaded,
+            seen,
+            poses,
             moving,
             spoiled,
         })
     };
-    let all: Vec<Spoilt<'a>> = tables.par_iter().filter_map(spoilt).collect();
+    let mut all: Vec<Spoilt<'a>> = tables.par_iter().filter_map(spoilt).collect();
     if all.is_empty() {
         return Vec::new();
     }
+    let mut findings = exchanged(inputs, &mut all);
     let mut all = deviating(inputs, tracks, structural, &all);
-    let mut findings = in_several_bodies(inputs, &mut all);
+    findings.extend(in_several_bodies(inputs, &mut all));
     for rows in &all {
         match part_of_a_range(inputs, rows) {
             Some(finding) => findings.push(finding),
@@ -134,9 +142,12 @@ fn row_findings(rows: &Rows<'_>) -> Vec<Finding> {
         (!of_kind.is_empty()).then(|| {
             Finding::of_kind(id, "model", subject)
                 .with("count", Fact::count(of_kind.len()))
-                .with("worst", Fact::radians(largest(|row| row.off)))
-                .with("usual", Fact::radians(rows.usual))
                 .with("position", Fact::meters(largest(|row| row.distance)))
+                .with("angle", Fact::radians(largest(|row| row.angle)))
+                .with(
+                    "ratio",
+                    Fact::ratio(largest(|row| row.off) / rows.usual.max(SMALLEST)),
+                )
                 .at_rows(of_kind.iter().map(|row| rows.loaded.poses.rows[row.row]))
         })
     };
@@ -189,9 +200,74 @@ fn on_the_way(q: &[&Vec<f64>], row: &SpoiledRow, off: impl Fn(&[f64]) -> Option<
 struct Spoilt<'a> {
     body: &'a str,
     loaded: &'a Loaded,
+    /// `tracker_from_body` per row.
+    seen: &'a [Option<Isometry3<f64>>],
+    /// `base_from_link` per row.
+    poses: Vec<Isometry3<f64>>,
     /// Those that are right on the way to a neighboring row.
     moving: BTreeSet<usize>,
     spoiled: Spoiled,
+}
+
+/// Rows in which two bodies are each where the other should be; they are taken out of `all`.
+fn exchanged(inputs: &Inputs, all: &mut [Spoilt<'_>]) -> Vec<Finding> {
+    let mut findings = Vec::new();
+    for k in 0..all.len() {
+        for other in k + 1..all.len() {
+            let (before, from) = all.split_at_mut(other);
+            let (first, second) = (&mut before[k], &mut from[0]);
+            if first.loaded.name != second.loaded.name {
+                continue;
+            }
+            let rows: BTreeSet<usize> = first.exchanged_with(second).collect();
+            if rows.is_empty() {
+                continue;
+            }
+            for of in [&mut *first, &mut *second] {
+                of.spoiled.rows.retain(|row| !rows.contains(&row.row));
+            }
+            let kind = match few(inputs, first.loaded, rows.len()) {
+                true => "exchanged_few",
+                false => "exchanged",
+            };
+            let subject = Subject::recording(&first.loaded.name);
+            findings.push(
+                Finding::of_kind(catalog::ROW_OUTLIER, kind, subject)
+                    .with("count", Fact::count(rows.len()))
+                    .with("first", Fact::name(first.body))
+                    .with("second", Fact::name(second.body))
+                    .at_rows(rows.iter().map(|row| first.loaded.poses.rows[*row])),
+            );
+        }
+    }
+    findings
+}
+
+impl Spoilt<'_> {
+    /// Rows in which both bodies disagree with the others, and neither does with the other's pose.
+    fn exchanged_with<'s>(&'s self, other: &'s Self) -> impl Iterator<Item = usize> + 's {
+        let agrees = |of: &Self, row: &SpoiledRow, instead: &Self| {
+            let there = instead.seen.get(row.row).copied().flatten();
+            let mut seen = of.seen.to_vec();
+            seen[row.row] = there;
+            let spoiled = &of.spoiled;
+            let off = spoiled.disagreement_at(row.row, &of.poses[row.row], &seen, &of.poses);
+            off.is_some_and(|off| off < LEFT * row.off)
+        };
+        let both = self.spoiled.rows.iter().filter_map(move |row| {
+            let of_other = other.spoiled.rows.iter().find(|r| r.row == row.row)?;
+            Some((row, of_other))
+        });
+        both.filter(move |(row, of_other)| {
+            agrees(self, row, other) && agrees(other, of_other, self)
+        })
+        .map(|(row, _)| row.row)
+    }
+}
+
+/// Whether so few rows of a recording are wrong that a robust fit is right.
+fn few(inputs: &Inputs, loaded: &Loaded, rows: usize) -> bool {
+    inputs.robot.profile.solve.robust && rows as f64 <= FEW * loaded.poses.len() as f64
 }
 
 /// The rows most of whose samples deviate from the registration, and how.
@@ -225,6 +301,7 @@ fn deviating<'a>(
         loaded,
         moving,
         spoiled,
+        ..
     } in all
     {
         let row = |row: &SpoiledRow| {
@@ -233,6 +310,7 @@ fn deviating<'a>(
                 row: row.row,
                 off: row.off,
                 distance: deviation.distance,
+                angle: deviation.angle.unwrap_or(0.0),
                 kind: kind(row.off, deviation, moving.contains(&row.row)),
             })
         };
@@ -262,7 +340,6 @@ fn kind(off: f64, deviation: &Deviation, moving: bool) -> Kind {
 
 /// Rows in which several bodies deviate at once: not the bodies are wrong there, but what the joints are said to be, or the tracker's frame.
 fn in_several_bodies(inputs: &Inputs, all: &mut Vec<Rows<'_>>) -> Vec<Finding> {
-    let robust = inputs.robot.profile.solve.robust;
     let mut count: BTreeMap<(String, usize), usize> = BTreeMap::new();
     let far = |row: &Row| row.kind != Kind::Unsettled;
     for rows in all.iter() {
@@ -286,13 +363,9 @@ fn in_several_bodies(inputs: &Inputs, all: &mut Vec<Rows<'_>>) -> Vec<Finding> {
     }
     all.retain(|rows| !rows.rows.is_empty());
     let finding = |(recording, rows): (String, BTreeSet<u64>)| {
-        let all = inputs.recordings[&recording].poses.len() as f64;
-        // A robust fit is right where so few rows are wrong.
-        let few = robust && rows.len() as f64 <= FEW * all;
-        let kind = if few {
-            "several_bodies_few"
-        } else {
-            "several_bodies"
+        let kind = match few(inputs, &inputs.recordings[&recording], rows.len()) {
+            true => "several_bodies_few",
+            false => "several_bodies",
         };
         Finding::of_kind(catalog::ROW_OUTLIER, kind, Subject::recording(recording))
             .with("count", Fact::count(rows.len()))

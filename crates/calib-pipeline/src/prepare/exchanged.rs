@@ -7,7 +7,7 @@
 use std::collections::BTreeMap;
 
 use calib_finding::{Fact, Finding, Subject, catalog};
-use calib_geometry::statistics::upper_median;
+use calib_geometry::statistics::{quantile_nearest, upper_median};
 use calib_profile::BodyKind;
 use nalgebra::Point3;
 
@@ -21,6 +21,8 @@ const SAME: (f64, f64) = (2e-3, 0.1);
 const ROWS: usize = 400;
 /// Rows from which a typical distance is worth something.
 const ENOUGH: usize = 5;
+/// Part of the rows of a recording that an exchange must make rigid: others may show a reflection.
+const NEARLY: f64 = 0.9;
 
 /// Puts exchanged labels right; one finding for each exchange.
 pub(super) fn between_bodies(inputs: &mut Inputs) -> Vec<Finding> {
@@ -73,7 +75,8 @@ fn by_motion<'a>(loaded: &Loaded, bodies: [&'a [String]; 2]) -> Option<(Pair<'a>
     let mut largest: f64 = 0.0;
     for ((body, pair), shape) in bodies.into_iter().zip([(x, y), (y, x)]).zip(&shapes) {
         let before = shape.change()?;
-        let after = Shape::of(loaded, body, Some(pair)).change()?;
+        // In nearly all rows: of an exchange in some of them, both arrangements are rigid in their own.
+        let after = Shape::of(loaded, body, Some(pair)).most()?;
         if after > SAME.0.min(SAME.1 * before) {
             return None;
         }
@@ -118,8 +121,18 @@ fn exchanged<T>(of_markers: &mut BTreeMap<String, T>, (x, y): Pair<'_>) {
     of_markers.extend(of_x.map(|of_x| (y.clone(), of_x)));
 }
 
-/// Median and median deviation, m, of the distances of the markers of a body from three of them, by their places in the list.
-struct Shape(BTreeMap<(usize, usize), (f64, f64)>);
+/// The distances of the markers of a body from three of them, by their places in the list.
+struct Shape(BTreeMap<(usize, usize), Distance>);
+
+/// A distance over the rows of a recording, m.
+struct Distance {
+    /// Median.
+    middle: f64,
+    /// Median deviation from it.
+    change: f64,
+    /// Deviation that [`NEARLY`] all rows have at most.
+    most: f64,
+}
 
 impl Shape {
     /// Of a body in a recording, where one of its markers is called like another one.
@@ -147,7 +160,12 @@ impl Shape {
                     continue;
                 };
                 let mut off: Vec<f64> = distances.iter().map(|d| (d - middle).abs()).collect();
-                shape.insert((to, from), (middle, upper_median(&mut off).unwrap_or(0.0)));
+                let of_distance = Distance {
+                    middle,
+                    change: upper_median(&mut off).unwrap_or(0.0),
+                    most: quantile_nearest(&mut off, NEARLY).unwrap_or(0.0),
+                };
+                shape.insert((to, from), of_distance);
             }
         }
         Self(shape)
@@ -155,13 +173,18 @@ impl Shape {
 
     /// The largest change; `None` where nothing is seen often enough.
     fn change(&self) -> Option<f64> {
-        self.0.values().map(|(_, change)| *change).reduce(f64::max)
+        self.0.values().map(|d| d.change).reduce(f64::max)
+    }
+
+    /// The largest change that nearly all rows show at most; `None` as for [`change`](Self::change).
+    fn most(&self) -> Option<f64> {
+        self.0.values().map(|d| d.most).reduce(f64::max)
     }
 
     /// The only marker of which all distances change.
     fn moving(&self) -> Option<usize> {
         let mut least: BTreeMap<usize, f64> = BTreeMap::new();
-        for (&(marker, _), &(_, change)) in &self.0 {
+        for (&(marker, _), &Distance { change, .. }) in &self.0 {
             let own = least.entry(marker).or_insert(f64::INFINITY);
             *own = own.min(change);
         }
@@ -172,9 +195,9 @@ impl Shape {
 
     /// The largest difference from another shape; `None` where they have no distance in common.
     fn apart(&self, other: &Self) -> Option<f64> {
-        let common = self.0.iter().filter_map(|(place, (own, _))| {
-            let (known, _) = other.0.get(place)?;
-            Some((own - known).abs())
+        let common = self.0.iter().filter_map(|(place, own)| {
+            let known = other.0.get(place)?;
+            Some((own.middle - known.middle).abs())
         });
         common.reduce(f64::max)
     }

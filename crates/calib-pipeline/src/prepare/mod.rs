@@ -9,6 +9,7 @@ pub mod conditions;
 pub(crate) mod effects;
 pub mod estimators;
 mod exchanged;
+mod exchanged_rows;
 pub mod excluded;
 mod fresh;
 pub mod inputs;

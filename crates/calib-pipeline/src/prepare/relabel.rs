@@ -14,6 +14,7 @@ use calib_profile::BodyKind;
 use nalgebra::Point3;
 
 use crate::prepare::exchanged::between_bodies;
+use crate::prepare::exchanged_rows::in_rows;
 use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::scatter::scatter;
 
@@ -40,6 +41,7 @@ pub fn relabel(inputs: &mut Inputs) -> Vec<Finding> {
     let stated = inputs.robot.profile.tracker.marker_sigma;
     // The distances of a body whose labels are another's say nothing of its rows.
     let mut findings = between_bodies(inputs);
+    findings.extend(in_rows(inputs));
     for (body, markers) in bodies {
         findings.extend(relabel_body(
             &mut inputs.recordings,

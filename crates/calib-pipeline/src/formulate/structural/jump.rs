@@ -20,11 +20,23 @@ pub(super) fn finding(layout: &Layout<'_>, outcome: &Outcome, found: &Jump) -> F
         Moved::Joint(joint) => {
             Finding::of_kind(id, "joint-far", Subject::joint(layout.joint(joint)))
         }
+        Moved::Names {
+            first,
+            second,
+            after,
+        } => {
+            let kind = if after { "names-after" } else { "names-before" };
+            let [body, other] = [first, second].map(|body| layout.bodies[body.0]);
+            Finding::of_kind(id, kind, Subject::body(body))
+                .with("body", Fact::name(body))
+                .with("other", Fact::name(other))
+        }
     };
-    let name = |moved: &Moved| match moved {
-        Moved::Tracker => layout.inputs.robot.profile.tracker.frame.clone(),
-        Moved::Body(body) => layout.bodies[body.0].to_owned(),
-        Moved::Joint(joint) => layout.joint(*joint).to_owned(),
+    let name = |moved: &Moved| match *moved {
+        Moved::Tracker => Some(layout.inputs.robot.profile.tracker.frame.clone()),
+        Moved::Body(body) => Some(layout.bodies[body.0].to_owned()),
+        Moved::Joint(joint) => Some(layout.joint(joint).to_owned()),
+        Moved::Names { .. } => None,
     };
     let later: Vec<String> = found.later.iter().map(recording).collect();
     let own = recording(&found.recording);
@@ -33,7 +45,7 @@ pub(super) fn finding(layout: &Layout<'_>, outcome: &Outcome, found: &Jump) -> F
         .filter(|name| **name != own && !later.contains(name))
         .cloned()
         .collect();
-    let rivals: Vec<String> = found.rivals.iter().map(name).collect();
+    let rivals: Vec<String> = found.rivals.iter().filter_map(name).collect();
     let some = |names: Vec<String>| (!names.is_empty()).then(|| Fact::names(names));
     let (before, after) = (row(found.before), row(found.after));
     finding
