@@ -37,6 +37,7 @@ mod late_joints;
 mod layering;
 mod loads;
 mod many_markers;
+mod mimics;
 mod month;
 mod occluded;
 mod outputs;

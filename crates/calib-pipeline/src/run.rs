@@ -108,6 +108,7 @@ pub fn run_on(
         held_out: verified.held_out.as_ref(),
         urdf: &urdf,
         residuals: &verified.residuals,
+        sigmas: &verified.sigmas,
         selection: chosen.map(|chosen| chosen.fitted(fit)),
         arguments: options.arguments(),
     };

@@ -124,6 +124,15 @@ super::topic! {
             "Joint `{joint}` moves {excess:percent} ± {sigma:percent} more than its readings say, {moves} over its range. A tracker whose lengths are too long by the same ratio gives the same data (negative: less, and too short): only the lengths of the robot distinguish the two.",
             "Measure a known length with the tracker: a scale bar, or two marks at a known distance, best as long as the range of the joint. Where the tracker is right, keep the gain; otherwise correct its lengths and take `gain` out of what is free.";
     }
+    /// A number of the robot depends on the ratio of a joint that mimics another.
+    MIMIC_RATIO = "mimic-ratio" {
+        "another": Warning,
+            "Joint `{joint}` follows `{source}` by a ratio of {ratio} ± {sigma} where the ratio is estimated; the URDF states {stated}. The {quantity} is then {value} ± {value_sigma}, not {before} ± {before_sigma}: a wrong ratio looks like a wrong length. Positions that were recorded fit both.",
+            "Compare the ratio with the mechanism, and correct `multiplier` in the URDF. To let the fit estimate it: `solve: {joints: {{joint}: {free: [offset, axis, gain]}}, prior: {gain_percent: 25}}`.";
+        "taken": Info,
+            "That the {quantity} is known to {before_sigma} holds only where `{joint}` follows `{source}` by exactly {stated}, as the URDF states. With the ratio estimated, {ratio} ± {sigma}, it is {value} ± {value_sigma}, not {before}.",
+            "If the ratio of the mechanism is exact, nothing is to be done. Otherwise let the fit estimate it: `solve: {joints: {{joint}: {free: [offset, axis, gain]}}, prior: {gain_percent: 25}}`.";
+    }
     /// A marker scatters unlike the others of its body.
     MARKER_NOISE = "marker-noise" {
         "": Info,

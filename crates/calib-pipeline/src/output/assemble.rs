@@ -164,7 +164,11 @@ fn of_robot(
     let Some(fit) = e.fit else {
         return (Vec::new(), Vec::new());
     };
-    let changes = information.map_or_else(Vec::new, |of| robot_changes(e.inputs, fit, of));
+    let mut changes = information.map_or_else(Vec::new, |of| robot_changes(e.inputs, fit, of));
+    for change in &mut changes {
+        change.sigma = e.sigmas.get(&change.name).copied().or(change.sigma);
+    }
+    let changes = RobotChange::sorted(changes);
     let limits = accuracy_limits(e.inputs, e.held_out, fit, &tracker_noise(e, fit));
     (changes, limits)
 }

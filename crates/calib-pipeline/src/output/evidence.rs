@@ -45,6 +45,8 @@ pub struct Evidence<'a> {
     pub urdf: &'a PatchedUrdf,
     /// Residuals of the fit.
     pub residuals: &'a [ResidualRow],
+    /// σ of the robot's numbers, by name, where that of the fit holds only for ratios that nobody measured.
+    pub sigmas: &'a BTreeMap<String, f64>,
     /// How the model was chosen, where it was.
     pub selection: Option<Selection>,
     /// Options of the run that are not the profile's, as arguments.

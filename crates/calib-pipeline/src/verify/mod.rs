@@ -14,6 +14,7 @@ pub mod information;
 pub mod invariants;
 pub mod known;
 pub mod left_out;
+mod mimics;
 pub(crate) mod motions;
 pub mod moved;
 pub mod readings;
@@ -57,6 +58,8 @@ pub struct Verified {
     pub known: BTreeMap<Number, Known>,
     /// Every residual.
     pub residuals: Vec<ResidualRow>,
+    /// σ of the robot's numbers, by name, where that of the fit holds only for ratios that nobody measured.
+    pub sigmas: BTreeMap<String, f64>,
     /// What made the residuals, each cause beside the others.
     pub causes: Causes,
 }
@@ -84,6 +87,7 @@ pub fn verified(
             held_out: held_out(inputs, tracks, nominal, solved, refitted),
             known: fit.map_or_else(Default::default, |fit| known_numbers(inputs, fit)),
             residuals: residual_rows(inputs, tracks, &solved.robot, fit),
+            sigmas: BTreeMap::new(),
             causes: Causes::default(),
         },
     );
@@ -100,6 +104,10 @@ pub fn verified(
     if let Some(changed) = verified.causes.change.clone() {
         verified.findings = one_cause(changed, verified.findings);
     }
+    let of_ratios = fit.map(|fit| mimics::ratios(inputs, checked, fit));
+    let of_ratios = of_ratios.unwrap_or_default();
+    verified.findings.extend(of_ratios.findings);
+    verified.sigmas = of_ratios.sigmas;
     verified
 }
 

@@ -1,0 +1,213 @@
+//! Joints that follow another one by a ratio that the URDF states and nobody measured.
+//!
+//! A wrong ratio looks like a wrong length: a finger whose last joint turns 0.9 times as far as the one before reaches the same points with a longer
+//! link, to within the noise. The fit takes the ratio as exact, and states how well it knows the length under that condition. Here the ratio is freed, with
+//! a prior as wide as couplings of real hands are off, and everything is fitted again: what changes then is said.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use calib_core::{ParameterEstimate, ParameterKind, Settings};
+use calib_finding::{Fact, Finding, Subject, Unit, catalog};
+use calib_profile::{JointFree, OriginFreeSet, Solve};
+use calib_report::RobotChange;
+use calib_urdf::{JointId, RobotModel};
+
+use crate::formulate::checked::Checked;
+use crate::formulate::formulation::{FreeSet, MlFit};
+use crate::formulate::ml;
+use crate::prepare::inputs::Inputs;
+use crate::verify::information::data_information;
+use crate::verify::robot_changes::robot_changes;
+
+/// Prior σ of a ratio, as a share of it: tendons and linkages of hands.
+const WIDE: f64 = 0.25;
+/// A ratio this many standard deviations from the stated one is another: one right one of eighty is called so.
+const CLEAR: f64 = 2.5;
+/// A standard deviation that grows by this factor was one of a condition, and so was a number that changes by as many of them.
+const WIDER: f64 = 3.0;
+/// Changes that matter, m and rad.
+const MATTERS: (f64, f64) = (1e-4, 1e-3);
+
+/// What ratios that nobody measured do to the robot's numbers.
+#[derive(Debug, Default)]
+pub struct Ratios {
+    /// One finding for each joint whose ratio the numbers depend on.
+    pub findings: Vec<Finding>,
+    /// σ with the ratios free, by the number's name, where the σ of the fit holds only for the stated ratios: m or rad.
+    pub sigmas: BTreeMap<String, f64>,
+}
+
+/// Fits the ratios that the fit held.
+pub(super) fn ratios(inputs: &Inputs, checked: &Checked, fit: &MlFit) -> Ratios {
+    let followers = followers(inputs, fit);
+    if followers.is_empty() {
+        return Ratios::default();
+    }
+    let before = changes(inputs, fit);
+    let Some((wide, freed)) = with_ratios(inputs, checked, &followers) else {
+        return Ratios::default();
+    };
+    let after = changes(&wide, &freed);
+    let model = &inputs.robot.model;
+    let of_joint = |joint: &JointId| of_follower(model, *joint, &freed, (&before, &after));
+    let wider = before.iter().filter_map(|b| {
+        let sigma = after.iter().find(|a| a.name == b.name)?.sigma?;
+        (sigma > WIDER * b.sigma?).then(|| (b.name.clone(), sigma))
+    });
+    Ratios {
+        findings: followers.iter().filter_map(of_joint).collect(),
+        sigmas: wider.collect(),
+    }
+}
+
+/// Joints that mimic another, have no readings of their own, and whose ratio the fit holds.
+fn followers(inputs: &Inputs, fit: &MlFit) -> Vec<JointId> {
+    let model = &inputs.robot.model;
+    let read = |name: &String| {
+        inputs
+            .recordings
+            .values()
+            .any(|r| r.poses.joints.contains_key(name))
+    };
+    let follows = |joint: &JointId| {
+        let joint = model.joint(*joint);
+        joint.mimic.is_some()
+            && !read(&joint.name)
+            && gain_of(&fit.solution.parameters, &joint.name).is_none()
+    };
+    model.joint_ids().filter(follows).collect()
+}
+
+fn gain_of<'p>(parameters: &'p [ParameterEstimate], joint: &str) -> Option<&'p ParameterEstimate> {
+    let is_gain = |p: &&ParameterEstimate| is_gain(&p.kind) && p.joint.as_deref() == Some(joint);
+    parameters.iter().find(is_gain)
+}
+
+fn is_gain(kind: &ParameterKind) -> bool {
+    matches!(kind, ParameterKind::Effect(kind) if kind.term().class == "gain")
+}
+
+fn changes(inputs: &Inputs, fit: &MlFit) -> Vec<RobotChange> {
+    robot_changes(inputs, fit, &data_information(inputs, fit))
+}
+
+/// The fit with the ratios free.
+fn with_ratios(
+    inputs: &Inputs,
+    checked: &Checked,
+    followers: &[JointId],
+) -> Option<(Inputs, MlFit)> {
+    let mut inputs = inputs.clone();
+    let model = &inputs.robot.model;
+    let solve = &mut inputs.robot.profile.solve;
+    for joint in followers {
+        let free = freed(solve, model, *joint)?;
+        solve.joints.entry(*joint).or_default().free = Some(free);
+    }
+    let mut settings = Settings::default();
+    settings.robust.enabled = inputs.robot.profile.solve.robust;
+    let mut stated = ml::state(&inputs, &checked.tracks, &checked.start, FreeSet::Profile);
+    let name = |joint: &JointId| inputs.robot.model.joint(*joint).name.as_str();
+    let of_followers = |joint: Option<&str>| followers.iter().any(|f| Some(name(f)) == joint);
+    let widths: Vec<_> = stated
+        .widths
+        .iter()
+        .flat_map(|kind| kind.parameters.clone())
+        .collect();
+    for id in widths {
+        let parameter = stated.problem.parameter_mut(id);
+        if is_gain(&parameter.kind) && of_followers(parameter.joint.as_deref()) {
+            parameter.prior_sigma = Some(WIDE);
+        }
+    }
+    let fit = ml::fit(stated, &inputs, &settings).ok()?;
+    Some((inputs, fit))
+}
+
+/// What is free of a joint, and its gain.
+fn freed(solve: &Solve, model: &RobotModel, joint: JointId) -> Option<BTreeSet<JointFree>> {
+    let now = solve.free_set(joint, true, !model.joint(joint).kind.turns());
+    let origin = match now.origin {
+        OriginFreeSet::Held => None,
+        OriginFreeSet::Axis => Some(JointFree::Axis),
+        OriginFreeSet::Full => Some(JointFree::Origin),
+    };
+    let gain = calib_core::EFFECTS
+        .iter()
+        .find(|effect| effect.id == "gain")?;
+    let effects = now
+        .effects
+        .iter()
+        .filter(|free| free.effect.profile.is_some());
+    let effects = effects.map(|free| JointFree::Effect(free.effect));
+    Some(
+        origin
+            .into_iter()
+            .chain(effects)
+            .chain([JointFree::Effect(gain)])
+            .collect(),
+    )
+}
+
+/// What is to be said of one joint.
+fn of_follower(
+    model: &RobotModel,
+    joint: JointId,
+    freed: &MlFit,
+    (before, after): (&[RobotChange], &[RobotChange]),
+) -> Option<Finding> {
+    let joint = model.joint(joint);
+    let mimic = joint.mimic?;
+    let source = &model.joint(mimic.joint).name;
+    let gain = gain_of(&freed.solution.parameters, &joint.name)?;
+    let sigma = gain.sigma?;
+    let about = |name: &str| {
+        name.split('.')
+            .any(|part| part == joint.name || part == *source)
+    };
+    let both = before.iter().filter(|b| about(&b.name)).filter_map(|b| {
+        let a = after.iter().find(|a| a.name == b.name)?;
+        Some((b, a, b.sigma.filter(|s| *s > 0.0)?, a.sigma?))
+    });
+    let matters = |unit: Unit, size: f64| {
+        let least = if unit == Unit::Meter {
+            MATTERS.0
+        } else {
+            MATTERS.1
+        };
+        size.abs() > least
+    };
+    let both: Vec<_> = both.collect();
+    let is_another = gain.value.abs() > CLEAR * sigma;
+    let moved = both
+        .iter()
+        .map(|&(b, a, stated, now)| ((a.value - b.value).abs() / stated, (b, a, stated, now)));
+    let moved = moved
+        .filter(|(by, (b, a, ..))| is_another && *by > WIDER && matters(b.unit, a.value - b.value));
+    let moved = moved.max_by(|x, y| x.0.total_cmp(&y.0));
+    let wider = both
+        .iter()
+        .map(|&(b, a, stated, now)| (now / stated, (b, a, stated, now)));
+    // A number that the priors of the robot decide besides is no claim.
+    let wider =
+        wider.filter(|(by, (b, .., now))| b.measured && *by > WIDER && matters(b.unit, *now));
+    let wider = wider.max_by(|x, y| x.0.total_cmp(&y.0));
+    let (kind, (b, a, stated, now)) = match (moved, wider) {
+        (Some((_, found)), _) => ("another", found),
+        (None, Some((_, found))) => ("taken", found),
+        (None, None) => return None,
+    };
+    Some(
+        Finding::of_kind(catalog::MIMIC_RATIO, kind, Subject::joint(&joint.name))
+            .with("joint", Fact::name(&joint.name))
+            .with("source", Fact::name(source))
+            .with("stated", Fact::ratio(mimic.multiplier))
+            .with("ratio", Fact::ratio(mimic.multiplier * (1.0 + gain.value)))
+            .with("sigma", Fact::ratio(mimic.multiplier.abs() * sigma))
+            .with("quantity", Fact::name(&b.text))
+            .with("before", Fact::number(b.value, b.unit))
+            .with("before_sigma", Fact::number(stated, b.unit))
+            .with("value", Fact::number(a.value, b.unit))
+            .with("value_sigma", Fact::number(now, b.unit)),
+    )
+}
