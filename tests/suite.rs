@@ -70,6 +70,7 @@ mod tolerance;
 mod truth;
 mod tutorial;
 mod twin;
+mod two_arms;
 mod unchanged;
 mod urdf_out;
 mod verdict;

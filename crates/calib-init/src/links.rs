@@ -364,7 +364,8 @@ impl<'a> Scene<'a> {
                 }
                 on[at].1 = link;
                 let asked = Assigned::new(on.clone(), self.ask(chain, &on));
-                if asked.explains_more_than(&best) {
+                // Where the correction is another link, that link is the one to compare.
+                if !asked.is_on_a_wrong_link() && asked.explains_more_than(&best) {
                     best = asked;
                 }
             }
@@ -406,6 +407,12 @@ impl Assigned {
             );
             consistent && outcome.expected.is_none_or(|e| outcome.rms <= e.limit)
         })
+    }
+
+    /// The correction puts a body on another link.
+    fn is_on_a_wrong_link(&self) -> bool {
+        let mut corrections = self.named().into_iter().flat_map(|named| &named.correction);
+        corrections.any(|scoped| matches!(scoped.hypothesis, Hypothesis::WrongLink { .. }))
     }
 
     /// A clearly smaller residual, or about the same with fewer corrections.
