@@ -19,6 +19,9 @@ pub enum Diagnosis {
         limit_m: f64,
         /// What the tracker's noise contributes to the same number, m.
         tracker_m: f64,
+        /// Nothing but the residuals of the fit tells that noise: what the recordings or the model lack is part of it.
+        #[serde(default)]
+        from_residuals: bool,
     },
     /// The data, the wiring or the model have an error of structure: a wrong sign, swapped names, a moved body.
     StructuralFault {
@@ -102,7 +105,15 @@ fn below_noise(report: &Report) -> Option<Diagnosis> {
         limit_name: limit.name.clone(),
         limit_m: limit.limit,
         tracker_m,
+        from_residuals: from_residuals(report),
     })
+}
+
+/// Whether the tracker writes poses and nobody stated their noise: markers scatter about their bodies, poses about nothing.
+fn from_residuals(report: &Report) -> bool {
+    let of = |kind| report.noise.iter().filter(move |noise| noise.kind == kind);
+    of(NoiseKind::Orientation).next().is_some()
+        && of(NoiseKind::Position).all(|noise| noise.stated.is_none())
 }
 
 /// Noise of one coordinate, m, that no tracker has with which robots are calibrated: where none is stated, what the model lacks was found as noise.

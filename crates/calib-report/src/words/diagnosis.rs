@@ -16,9 +16,20 @@ impl Diagnosis {
                 limit_name,
                 limit_m,
                 tracker_m,
+                from_residuals,
             } => {
                 let [limit, tracker] = [limit_m, tracker_m].map(|m| number::plain(*m, Unit::Meter));
                 let enough = (ROOM * tracker_m * 1e4).ceil() / 10.0;
+                if *from_residuals {
+                    return [
+                        format!(
+                            "The limit of {limit} is below {tracker}, which the fit found as the noise of one tracker measurement. The profile states none: what is wrong in the recordings or missing in the model is part of it."
+                        ),
+                        format!(
+                            "State the noise of the tracker, `tracker: {{body_sigma_mm: …, body_sigma_deg: …}}`, so that the fit shows what exceeds it; only if the tracker is that noisy, set `solve.limits.{limit_name}` to {enough} or more. Then run `{again}`."
+                        ),
+                    ];
+                }
                 [
                     format!(
                         "The limit of {limit} is below the noise of one tracker measurement, {tracker}: no robot can meet it."
