@@ -474,3 +474,28 @@ fn a_wrist_sign_near_its_axis_is_not_accepted() {
         assert_eq!(report["verdict"], "rejected", "{:?}", report["reasons"]);
     }
 }
+
+/// Where a tracker writes poses and nobody states their noise, a fault of the recordings is part of the noise that the fit finds: it is no bound of
+/// any robot.
+#[test]
+fn noise_that_only_the_residuals_show_is_no_bound() {
+    const JUSTIN: &str = "robots/justin.yaml";
+    let stated = ", body_sigma_mm: 0.5, body_sigma_deg: 0.15";
+    for (noise, from_residuals) in [(stated, false), ("", true)] {
+        let dir = Scratch::new()
+            .robot("justin")
+            .edit(JUSTIN, "held_out_rms_mm: 3", "held_out_rms_mm: 0.3")
+            .edit(JUSTIN, stated, noise);
+        let ran = dir.calib(["run", JUSTIN, "--out", "out"]);
+        assert_eq!(ran.code, 1, "{}{}", ran.stdout, ran.stderr);
+        let diagnosis = &dir.json("out/report.json")["diagnosis"];
+        assert_eq!(diagnosis["kind"], "limit_below_noise");
+        assert_eq!(diagnosis["from_residuals"], from_residuals);
+        let words = ran.words();
+        assert_eq!(words.contains("no robot can meet it"), !from_residuals);
+        assert_eq!(
+            words.contains("State the noise of the tracker"),
+            from_residuals
+        );
+    }
+}
