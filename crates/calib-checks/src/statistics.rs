@@ -1,11 +1,12 @@
 //! Robust spreads and ranges.
 
+use calib_geometry::statistics::SIGMA_PER_MAD;
 pub(crate) use calib_geometry::statistics::median;
 
 /// σ of a Gaussian from the median absolute deviation about `center`.
 pub(crate) fn robust_sigma(values: impl Iterator<Item = f64>, center: f64) -> Option<f64> {
-    // 1 / Φ⁻¹(3/4)
-    median(values.map(|value| (value - center).abs()).collect()).map(|mad| 1.4826 * mad)
+    let off = values.map(|value| (value - center).abs()).collect();
+    median(off).map(|mad| SIGMA_PER_MAD * mad)
 }
 
 /// Smallest and largest.

@@ -18,6 +18,9 @@ pub fn median(mut values: Vec<f64>) -> Option<f64> {
     Some(0.5 * (values.get(n.checked_sub(1)? / 2)? + values.get(n / 2)?))
 }
 
+/// σ of a Gaussian per median absolute deviation, 1 / Φ⁻¹(3/4).
+pub const SIGMA_PER_MAD: f64 = 1.4826;
+
 /// (2), which changes the order of the values; `None` of nothing.
 pub fn upper_median(values: &mut [f64]) -> Option<f64> {
     let middle = values.len() / 2;

@@ -49,10 +49,10 @@ super::topic! {
             "The zero of this joint changed by [[{angle}]][[{distance}]] between row {before} and row {row}[[; {later:code} came after]]: with that the recordings fit the nominal robot to {best} rms, without it to {none} rms, where nominal errors explain {limit}.[[ Nearly as likely: {rivals:code} moved.]]",
             "Check the joint's encoder and its coupling, home the robot, and record again; until then keep only the rows of one side.";
         "names-after": Error,
-            "Bodies `{body}` and `{other}` have each other's names from row {row} on[[; {later:code} came after]]: exchanged there, the recordings fit the nominal robot to {best} rms, as they are to {none} rms, where nominal errors explain {limit}.[[ Nearly as likely: {rivals:code} moved.]]",
+            "Bodies `{body}` and `{other}` have each other's names from row {row} on[[; {later:code} came after]]: with the names exchanged there, the recordings fit the nominal robot to {best} rms, without that to {none} rms, where nominal errors explain {limit}.[[ Nearly as likely: {rivals:code} moved.]]",
             "Correct the names in the tracker's software, or in the rows from {row} on[[, and in {later:code}]]. Give the bodies clearly different shapes before the next recording.";
         "names-before": Error,
-            "Bodies `{body}` and `{other}` have each other's names up to row {before}[[; {earlier:code} came before]]: exchanged there, the recordings fit the nominal robot to {best} rms, as they are to {none} rms, where nominal errors explain {limit}.[[ Nearly as likely: {rivals:code} moved.]]",
+            "Bodies `{body}` and `{other}` have each other's names up to row {before}[[; {earlier:code} came before]]: with the names exchanged there, the recordings fit the nominal robot to {best} rms, without that to {none} rms, where nominal errors explain {limit}.[[ Nearly as likely: {rivals:code} moved.]]",
             "Correct the names in the tracker's software, or in the rows up to {before}[[, and in {earlier:code}]]. Give the bodies clearly different shapes before the next recording.";
         "drift": Warning,
             "The tracker's frame drifted by {distance} ± {sigma}[[ and {angle}]] from the first row to the last.[[ Missing physics explains as much: `{physics}`.]]",

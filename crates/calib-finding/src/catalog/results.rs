@@ -127,11 +127,11 @@ super::topic! {
     /// A number of the robot depends on the ratio of a joint that mimics another.
     MIMIC_RATIO = "mimic-ratio" {
         "another": Warning,
-            "Joint `{joint}` follows `{source}` by a ratio of {ratio} ± {sigma} where the ratio is estimated; the URDF states {stated}. The {quantity} is then {value} ± {value_sigma}, not {before} ± {before_sigma}: a wrong ratio looks like a wrong length. Positions that were recorded fit both.",
-            "Compare the ratio with the mechanism, and correct `multiplier` in the URDF. To let the fit estimate it: `solve: {joints: {{joint}: {free: [offset, axis, gain]}}, prior: {gain_percent: 25}}`.";
+            "Joint `{joint}` follows `{source}` by {ratio} ± {sigma}, if that is estimated; the URDF states {stated}. The {quantity} is then {value} ± {value_sigma}, not {before}.",
+            "Correct `multiplier` in the URDF by the mechanism, or estimate it: `solve: {joints: {{joint}: {free: [offset, axis, gain]}}, prior: {gain_percent: 25}}`.";
         "taken": Info,
-            "That the {quantity} is known to {before_sigma} holds only where `{joint}` follows `{source}` by exactly {stated}, as the URDF states. With the ratio estimated, {ratio} ± {sigma}, it is {value} ± {value_sigma}, not {before}.",
-            "If the ratio of the mechanism is exact, nothing is to be done. Otherwise let the fit estimate it: `solve: {joints: {{joint}: {free: [offset, axis, gain]}}, prior: {gain_percent: 25}}`.";
+            "The {quantity} is known to {before_sigma} only if `{joint}` follows `{source}` by exactly {stated}, as the URDF states. With that estimated, {ratio} ± {sigma}, it is {value} ± {value_sigma}.",
+            "If the mechanism is exact, nothing is to be done. Otherwise estimate the ratio: `solve: {joints: {{joint}: {free: [offset, axis, gain]}}, prior: {gain_percent: 25}}`.";
     }
     /// A marker scatters unlike the others of its body.
     MARKER_NOISE = "marker-noise" {

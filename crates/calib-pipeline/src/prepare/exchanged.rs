@@ -95,8 +95,9 @@ fn by_shape(
     let mut largest: f64 = 0.0;
     for ((body, pair), shape) in bodies.into_iter().zip([(x, y), (y, x)]).zip(shapes) {
         let as_it_is = Shape::of(loaded, body, None).apart(shape)?;
-        let exchanged = Shape::of(loaded, body, Some(pair)).apart(shape)?;
-        if as_it_is < ANOTHER || exchanged > SAME.0.min(SAME.1 * as_it_is) {
+        let exchanged = Shape::of(loaded, body, Some(pair));
+        let same = SAME.0.min(SAME.1 * as_it_is);
+        if as_it_is < ANOTHER || exchanged.apart(shape)? > same || exchanged.most()? > same {
             return None;
         }
         largest = largest.max(as_it_is);

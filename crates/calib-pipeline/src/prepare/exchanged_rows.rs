@@ -6,10 +6,12 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use calib_checks::model::disagreement;
 use calib_finding::{Fact, Finding, Subject, catalog};
-use calib_geometry::statistics::upper_median;
+use calib_geometry::statistics::{SIGMA_PER_MAD, upper_median};
 use calib_profile::{BodyKind, Usage};
-use nalgebra::Point3;
+use calib_urdf::{LinkId, RobotModel};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 
 use crate::prepare::inputs::{Inputs, Loaded};
 
@@ -20,14 +22,18 @@ const SEEDS: usize = 8;
 /// Rows that agree with a template at least, and as a part of all.
 const ENOUGH: (usize, f64) = (5, 0.25);
 /// Root mean square of distances about a template, in σ, up to which a row agrees with it.
-const AGREES: f64 = 3.0;
-/// The same from which on a row is looked at.
+const AGREES: f64 = 4.0;
+/// The same up to which the template is learned from a row, and from which on a row is looked at.
 const OFF: f64 = 2.0;
 /// How much smaller the sum of squares is, in σ², than that of the labels as they are and than that of any other arrangement: twice the logarithm of a
 /// ratio of likelihoods, here of 10¹³.
 const EVIDENCE: f64 = 60.0;
-/// σ of a Gaussian per median absolute deviation, 1 / Φ⁻¹(3/4).
-const SIGMA_PER_MAD: f64 = 1.4826;
+/// Rows that are compared with the robot's motion.
+const COMPARED: usize = 64;
+/// What the links of the other body leave at most of the disagreement with the robot's motion where two bodies have each other's names.
+const CROSSED: f64 = 0.5;
+/// Disagreement, rad, that errors of a nominal robot make: below it, no link is better than another.
+const GOOD: f64 = 0.01;
 /// Smallest σ of a distance, m.
 const SMALLEST: f64 = 5e-5;
 /// Markers of a body up to which every order of its labels is tried; beyond that, only the order of the profile.
@@ -35,44 +41,40 @@ const ORDERED: usize = 4;
 /// Markers of a body, at least and at most.
 const MARKERS: std::ops::RangeInclusive<usize> = 3..=24;
 
-/// A row of a recording: the place of the recording in [`Table`]s, and of the row in it.
+/// A row of a recording: the place of the recording, those that are fitted first, and of the row in it.
 type Place = (usize, usize);
 
 /// Puts the labels of bodies right in rows where they are exchanged; one finding for each exchange and recording.
 pub(super) fn in_rows(inputs: &mut Inputs) -> Vec<Finding> {
     let stated = inputs.robot.profile.tracker.marker_sigma;
     let bodies = inputs.robot.profile.bodies.iter();
-    let bodies: Vec<(String, Vec<String>)> = bodies
+    let bodies: Vec<Named<'_>> = bodies
         .filter_map(|(name, body)| match &body.kind {
-            BodyKind::Markers { names, .. } if MARKERS.contains(&names.len()) => {
-                Some((name.clone(), names.clone()))
-            }
+            BodyKind::Markers { names, .. } if MARKERS.contains(&names.len()) => Some(Named {
+                name,
+                markers: names,
+                link: body.link,
+            }),
             _ => None,
         })
         .collect();
     if bodies.len() < 2 {
         return Vec::new();
     }
-    // What is fitted comes first: where both arrangements are as frequent, it is called right.
+    // What is fitted comes first: of two arrangements that are as frequent, the earlier one is called right unless the robot tells.
     let mut tables: Vec<&mut Loaded> = inputs.recordings.values_mut().collect();
     tables.sort_by_key(|loaded| loaded.spec.usage == Usage::Validation);
-    let exchanges = {
-        let learned: Vec<Learned<'_>> = bodies
-            .iter()
-            .filter_map(|(name, markers)| Learned::of(&tables, name, markers, stated))
-            .collect();
-        exchanges(&learned)
-    };
-    let mut found: BTreeMap<(usize, Said), BTreeSet<u64>> = BTreeMap::new();
+    let exchanges = found(&inputs.robot.model, &tables, &bodies, stated);
+    let mut by_kind: BTreeMap<(usize, Said), BTreeSet<u64>> = BTreeMap::new();
     for exchange in exchanges {
         let (table, row) = exchange.place;
         let loaded = &mut *tables[table];
         renamed(&mut loaded.poses.markers, row, &exchange.names);
         renamed(&mut loaded.shapes, row, &exchange.names);
-        let rows = found.entry((table, exchange.said)).or_default();
+        let rows = by_kind.entry((table, exchange.said)).or_default();
         rows.insert(loaded.poses.rows[row]);
     }
-    let findings = found.into_iter().map(|((table, said), rows)| {
+    let findings = by_kind.into_iter().map(|((table, said), rows)| {
         let (kind, [first, second]) = match said {
             Said::Bodies(names) => ("bodies_in_rows", names),
             Said::Markers(names) => ("markers_in_rows", names),
@@ -85,6 +87,100 @@ pub(super) fn in_rows(inputs: &mut Inputs) -> Vec<Finding> {
             .at_rows(rows)
     });
     findings.collect()
+}
+
+/// A body of the profile.
+struct Named<'a> {
+    name: &'a String,
+    markers: &'a [String],
+    link: LinkId,
+}
+
+/// The exchanges in all rows. Which of the two arrangements of a pair of bodies is right, the motion of the nominal robot tells.
+fn found(
+    model: &RobotModel,
+    tables: &[&mut Loaded],
+    bodies: &[Named<'_>],
+    stated: Option<f64>,
+) -> Vec<Exchange> {
+    // Body → the rows that show it by its right names.
+    let mut right: BTreeMap<String, BTreeSet<Place>> = BTreeMap::new();
+    let learned = |right: &BTreeMap<String, BTreeSet<Place>>| -> Vec<Learned<'_>> {
+        let of = |body| Learned::of(tables, body, stated, right);
+        bodies.iter().filter_map(of).collect()
+    };
+    let as_named = learned(&right);
+    let found = exchanges(&as_named);
+    for (k, first) in as_named.iter().enumerate() {
+        for second in &as_named[k + 1..] {
+            let pair = [first, second];
+            let said = Said::Bodies(pair.map(|body| body.named.name.clone()));
+            let rows = found.iter().filter(|exchange| exchange.said == said);
+            let rows: BTreeSet<Place> = rows.map(|exchange| exchange.place).collect();
+            if !rows.is_empty() && is_crossed(model, tables, pair, &rows) {
+                right.extend(pair.map(|body| (body.named.name.clone(), rows.clone())));
+            }
+        }
+    }
+    if right.is_empty() {
+        return found;
+    }
+    exchanges(&learned(&right))
+}
+
+/// Whether two bodies follow each other's links in the rows that agree with their templates, and their own in those that are `exchanged`: then
+/// these are the rows with the right names.
+fn is_crossed(
+    model: &RobotModel,
+    tables: &[&mut Loaded],
+    bodies: [&Learned<'_>; 2],
+    exchanged: &BTreeSet<Place>,
+) -> bool {
+    let off = |place: &Place| bodies.iter().any(|body| body.off.contains(place));
+    let all = (0..tables.len()).flat_map(|t| (0..tables[t].poses.len()).map(move |row| (t, row)));
+    let agreeing: BTreeSet<Place> = all.filter(|place| !off(place)).collect();
+    // Motions between the rows of one recording do not depend on where the tracker stood.
+    let ratio = |t: usize, places: &BTreeSet<Place>| {
+        let of_table: Vec<Place> = places
+            .iter()
+            .filter(|place| place.0 == t)
+            .copied()
+            .collect();
+        follows_the_other(model, tables, bodies, &of_table)
+    };
+    let of_table = |t: usize| ratio(t, &agreeing) / ratio(t, exchanged);
+    (0..tables.len()).map(of_table).product::<f64>() < CROSSED
+}
+
+/// The disagreement of two bodies with the motion of each other's links over that with their own, by the labels as they are; about 1 where the
+/// motion does not tell, as where only joints before both of them moved.
+fn follows_the_other(
+    model: &RobotModel,
+    tables: &[&mut Loaded],
+    [a, b]: [&Learned<'_>; 2],
+    places: &[Place],
+) -> f64 {
+    let step = places.len().div_ceil(COMPARED).max(1);
+    let off = |body: &Learned<'_>, link: LinkId| {
+        let rows = places.iter().step_by(step).filter_map(|&place| {
+            let q = tables[place.0].q[place.1].as_ref()?;
+            let seen = frame(&body.tracks.points(place));
+            Some((seen, model.root_from_link(q, link)))
+        });
+        let (seen, poses): (Vec<_>, Vec<_>) = rows.unzip();
+        // Where neither turns, they agree.
+        disagreement(&seen, &poses).unwrap_or(0.0)
+    };
+    let (own, other) = (a.named.link, b.named.link);
+    let by_other = off(a, other) + off(b, own);
+    by_other.max(GOOD) / (off(a, own) + off(b, other)).max(GOOD)
+}
+
+/// A frame of three markers, fixed in the body.
+fn frame(points: &Points) -> Option<Isometry3<f64>> {
+    let [a, b, c] = [points[0]?, points[1]?, points[2]?];
+    let turned = UnitQuaternion::face_towards(&(b - a), &(c - a));
+    Some(Isometry3::from_parts(Translation3::from(a), turned))
 }
 
 /// What was exchanged.
@@ -125,8 +221,7 @@ fn renamed<T: Clone>(of_markers: &mut BTreeMap<String, Vec<Option<T>>>, row: usi
 
 /// A body with its template.
 struct Learned<'a> {
-    name: &'a String,
-    markers: &'a [String],
+    named: &'a Named<'a>,
     /// Distance of each pair of markers, m.
     template: Vec<f64>,
     /// Of a distance, m.
@@ -159,36 +254,40 @@ impl<'a> Tracks<'a> {
 }
 
 impl<'a> Learned<'a> {
-    /// `None` where no template is agreed with often enough, or every row agrees.
+    /// `None` where no template is agreed with often enough, or every row agrees. `right`: by body, the rows to learn the template from, where not all.
     fn of(
         tables: &'a [&mut Loaded],
-        name: &'a String,
-        markers: &'a [String],
+        named: &'a Named<'a>,
         stated: Option<f64>,
+        right: &BTreeMap<String, BTreeSet<Place>>,
     ) -> Option<Self> {
-        let tracks = Tracks::of(tables, markers);
+        let tracks = Tracks::of(tables, named.markers);
+        let right = right.get(named.name);
         let length = |table: &Loaded| table.poses.len();
         let places =
             (0..tables.len()).flat_map(|t| (0..length(tables[t])).map(move |row| (t, row)));
         let places: Vec<Place> = places.collect();
-        let complete: Vec<Vec<f64>> = places
+        let looked_at = places
             .iter()
+            .filter(|place| right.is_none_or(|rows| rows.contains(place)));
+        let complete: Vec<Vec<f64>> = looked_at
             .step_by(places.len().div_ceil(ROWS).max(1))
             .filter_map(|place| distances(&tracks.points(*place)).into_iter().collect())
             .collect();
         let sigma = sigma(&complete)?.max(stated.unwrap_or(0.0) * std::f64::consts::SQRT_2);
         let enough = (ENOUGH.1 * complete.len() as f64).max(ENOUGH.0 as f64);
         let step = complete.len().div_ceil(SEEDS).max(1);
-        let mut seeds = complete.iter().step_by(step);
-        let template = seeds.find_map(|seed| {
+        let seeds = complete.iter().step_by(step).rev();
+        let templates = seeds.filter_map(|seed| {
             // A single row has the noise of one more.
             let close = agreeing(&complete, seed, sigma * std::f64::consts::SQRT_2);
             let close = agreeing(&complete, &mean(&close)?, sigma);
-            (close.len() as f64 >= enough).then(|| mean(&close))?
-        })?;
+            (close.len() as f64 >= enough).then(|| Some((close.len(), mean(&close)?)))?
+        });
+        // Of those that as many agree with, the first.
+        let (_, template) = templates.max_by_key(|(rows, _)| *rows)?;
         let mut learned = Self {
-            name,
-            markers,
+            named,
             template,
             sigma,
             tracks,
@@ -243,7 +342,7 @@ fn distances(points: &Points) -> Vec<Option<f64>> {
     points.iter().enumerate().flat_map(from).collect()
 }
 
-/// σ of a distance, m, by what it changes from row to row; that of the quieter pairs, as one marker may be loose.
+/// σ of a distance, m, by what it changes from row to row; that of the quieter half of the pairs, as one marker of four may be loose.
 fn sigma(rows: &[Vec<f64>]) -> Option<f64> {
     let pairs = rows.first()?.len();
     let of_pair = |pair: usize| {
@@ -255,7 +354,7 @@ fn sigma(rows: &[Vec<f64>]) -> Option<f64> {
     };
     let mut sigmas: Vec<f64> = (0..pairs).filter_map(of_pair).collect();
     sigmas.sort_by(f64::total_cmp);
-    let quiet = sigmas.get(sigmas.len().checked_sub(1)? / 4)?;
+    let quiet = sigmas.get(sigmas.len().checked_sub(1)? / 2)?;
     Some(quiet.max(SMALLEST))
 }
 
@@ -265,7 +364,7 @@ fn agreeing<'r>(rows: &'r [Vec<f64>], template: &[f64], sigma: f64) -> Vec<&'r V
             .iter()
             .zip(template)
             .map(|(d, t)| ((d - t) / sigma).powi(2));
-        squares.sum::<f64>() <= AGREES * AGREES * template.len() as f64
+        squares.sum::<f64>() <= OFF * OFF * template.len() as f64
     };
     rows.iter().filter(agrees).collect()
 }
@@ -292,8 +391,8 @@ fn of_row(bodies: [&Learned<'_>; 2], place: Place) -> Option<Exchange> {
     let [a, b] = bodies.map(|body| body.tracks.points(place));
     let together = |x: &Points, y: &Points| Some(bodies[0].misfit(x)?.with(bodies[1].misfit(y)?));
     let mut tried = Vec::new();
-    for (i, name) in bodies[0].markers.iter().enumerate() {
-        for (j, other) in bodies[1].markers.iter().enumerate() {
+    for (i, name) in bodies[0].named.markers.iter().enumerate() {
+        for (j, other) in bodies[1].named.markers.iter().enumerate() {
             let (mut x, mut y) = (a.clone(), b.clone());
             std::mem::swap(&mut x[i], &mut y[j]);
             if let Some(misfit) = together(&x, &y).filter(|_| a[i].is_some() && b[j].is_some()) {
@@ -305,13 +404,13 @@ fn of_row(bodies: [&Learned<'_>; 2], place: Place) -> Option<Exchange> {
     let of_second = best_order(&b, bodies[0]).filter(|_| a.len() == b.len());
     if let Some(((x, from_second), (y, from_first))) = of_second.zip(best_order(&a, bodies[1])) {
         let named = |order: Vec<usize>, to: &Learned<'_>, of: &Learned<'_>| -> Names {
-            let pairs = to.markers.iter().zip(order);
-            let names = pairs.map(|(name, k)| (name.clone(), of.markers[k].clone()));
+            let pairs = to.named.markers.iter().zip(order);
+            let names = pairs.map(|(name, k)| (name.clone(), of.named.markers[k].clone()));
             names.collect()
         };
         let mut names = named(from_second, bodies[0], bodies[1]);
         names.extend(named(from_first, bodies[1], bodies[0]));
-        let said = Said::Bodies(bodies.map(|body| body.name.clone()));
+        let said = Said::Bodies(bodies.map(|body| body.named.name.clone()));
         tried.push((x.with(y), said, names));
     }
     tried.sort_by(|x, y| x.0.sum.total_cmp(&y.0.sum));

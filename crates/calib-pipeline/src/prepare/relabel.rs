@@ -5,7 +5,7 @@
 //! arrangement ([`calib_core::relabel`]). What is put right is said, row by row; what cannot be, is left to the data
 //! checks.
 
-use calib_geometry::statistics::upper_median;
+use calib_geometry::statistics::{SIGMA_PER_MAD, upper_median};
 use std::collections::BTreeMap;
 
 use calib_core::{MarkerObservation, MeasurementKind, NoiseKind, PointId, Problem, measurement};
@@ -193,8 +193,6 @@ fn tolerance(
 ) -> Option<f64> {
     /// Rows from which a median deviation is worth something.
     const ENOUGH: usize = 5;
-    /// σ of a Gaussian per median absolute deviation, 1 / Φ⁻¹(3/4).
-    const SIGMA_PER_MAD: f64 = 1.4826;
     let mut distances: Vec<Vec<f64>> = vec![Vec::new(); markers * markers];
     let mut start = 0;
     for end in 1..=observations.len() {

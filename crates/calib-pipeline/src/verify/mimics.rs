@@ -7,7 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use calib_core::{ParameterEstimate, ParameterKind, Settings};
-use calib_finding::{Fact, Finding, Subject, Unit, catalog};
+use calib_finding::{Fact, Finding, Severity, Subject, Unit, catalog};
 use calib_profile::{JointFree, OriginFreeSet, Solve};
 use calib_report::RobotChange;
 use calib_urdf::{JointId, RobotModel};
@@ -23,6 +23,8 @@ use crate::verify::robot_changes::robot_changes;
 const WIDE: f64 = 0.25;
 /// A ratio this many standard deviations from the stated one is another: one right one of eighty is called so.
 const CLEAR: f64 = 2.5;
+/// A ratio this many standard deviations from the stated one refutes the URDF: lengths and zeros that were fitted with it are not those of the robot.
+const REFUTED: f64 = 5.0;
 /// A standard deviation that grows by this factor was one of a condition, and so was a number that changes by as many of them.
 const WIDER: f64 = 3.0;
 /// Changes that matter, m and rad.
@@ -197,8 +199,13 @@ fn of_follower(
         (None, Some((_, found))) => ("taken", found),
         (None, None) => return None,
     };
+    let finding = Finding::of_kind(catalog::MIMIC_RATIO, kind, Subject::joint(&joint.name));
+    let finding = match kind == "another" && gain.value.abs() > REFUTED * sigma {
+        true => finding.with_severity(Severity::Error),
+        false => finding,
+    };
     Some(
-        Finding::of_kind(catalog::MIMIC_RATIO, kind, Subject::joint(&joint.name))
+        finding
             .with("joint", Fact::name(&joint.name))
             .with("source", Fact::name(source))
             .with("stated", Fact::ratio(mimic.multiplier))

@@ -6,7 +6,7 @@ use calib_finding::Fact;
 
 use super::prose::{full_stop, sentence};
 use crate::diagnosis::NAMED_CAUSES;
-use crate::{Effect, Reason, ReasonId, Report};
+use crate::{Effect, Reason, ReasonId, Report, Severity};
 
 /// A warning or an objection.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -21,7 +21,8 @@ pub(crate) struct Remark {
     pub(crate) place: &'static str,
 }
 
-/// Everything that speaks against the result, the gravest first: of what weighs the same, that which names the cause of errors.
+/// Everything that speaks against the result, the gravest first: of what weighs the same, that which names the cause of errors, then other findings,
+/// then what the rules of the verdict say.
 pub(crate) fn remarks(report: &Report) -> Vec<Remark> {
     if report.reason_facts.is_empty() {
         let of_text = |text: &String| Remark {
@@ -35,7 +36,11 @@ pub(crate) fn remarks(report: &Report) -> Vec<Remark> {
     let against = report.reason_facts.iter();
     let against = against.filter(|reason| reason.effect != Effect::Supports);
     let mut against: Vec<&Reason> = against.collect();
-    against.sort_by_key(|reason| (Reverse(reason.effect), !names_a_cause(reason)));
+    let is_rule = |reason: &Reason| reason.values.get("finding").is_none();
+    against.sort_by_key(|reason| {
+        let cause = names_a_cause(reason);
+        (Reverse(reason.effect), !cause, is_rule(reason))
+    });
     let all = against.into_iter();
     all.flat_map(|reason| of_reason(report, reason)).collect()
 }
@@ -51,7 +56,9 @@ fn names_a_cause(reason: &Reason) -> bool {
 fn of_reason(report: &Report, reason: &Reason) -> Vec<Remark> {
     let id = reason.values.get("finding").and_then(Fact::word);
     let named = report.findings.iter();
-    let named = named.filter(|finding| Some(finding.id.as_str()) == id);
+    // One kind of a finding may be for information only beside another that warns.
+    let named = named
+        .filter(|finding| Some(finding.id.as_str()) == id && finding.severity != Severity::Info);
     let of_finding = |finding: &crate::Finding| Remark {
         effect: reason.effect,
         text: format!("{}: {}", finding.subject, full_stop(&finding.text())),
