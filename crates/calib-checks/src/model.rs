@@ -170,6 +170,7 @@ pub fn alignment(outcome: &OffsetOutcome, tolerance: f64) -> Option<Finding> {
                 .with("offset", Fact::seconds(map.offset))
                 .with("sigma", Fact::seconds(map.offset_sigma))
                 .with("drift", Fact::ratio(map.drift))
+                .with("sigma_drift", Fact::ratio(map.drift_sigma))
         }
         OffsetOutcome::Ambiguous {
             first,

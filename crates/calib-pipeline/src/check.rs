@@ -12,7 +12,7 @@ use calib_report::{BodyNoise, CheckOutcome, Checked, CheckedRecording, DataCheck
 use crate::error::{ExitCode, PipelineError};
 use crate::estimate::paper;
 use crate::estimate::start::{Start, start};
-use crate::formulate::bad_rows::{bad_rows, is_judged};
+use crate::formulate::bad_rows::{bad_rows, is_judged, not_said};
 use crate::formulate::by_likelihood::only_a_cross_check;
 use crate::formulate::completed::beside;
 use crate::formulate::formulation::{FreeSet, MlFit};
@@ -122,7 +122,8 @@ fn single_rows(
     let rows = beside(inputs, (tracks, findings), &fit, &settings).map_or(bad, |beside| beside.bad);
     let causes = causes(inputs, &fit, findings, None);
     causes.leave_unexplained(findings);
-    findings.extend(rows.findings);
+    let rows = not_said(rows.findings, findings);
+    findings.extend(rows);
     // `calib run` decides what it does to the result.
     let change = causes.change.or(causes.scatter);
     findings.extend(change.map(|f| f.with_severity(Severity::Warning)));

@@ -160,7 +160,7 @@ super::topic! {
             "The joint values of {recording:code} are {offset} ± {sigma} ahead of the tracker's data of their rows. This was estimated from the motion and corrected.",
             "Correct the times of the joint values if you can. The offset is taken into account.";
         "offset": Warning,
-            "The tracker's clock is {offset} ± {sigma} ahead of the robot's and runs {drift:ppm} faster.",
+            "The tracker's clock is {offset} ± {sigma} ahead of the robot's[[ and runs {drift:ppm} ± {sigma_drift:ppm} faster]].",
             "Use a shared clock if you can. The offset is taken into account.";
         "ambiguous": Error,
             "Offsets of {first} and {second} explain the motion nearly equally well (ratio {ratio}).",
@@ -259,7 +259,7 @@ super::topic! {
             "Several bodies disagree with the robot's model at once in {count:row}: their joint values are wrong, or the tracker's frame was off.",
             "Look at these rows. The robust fit leaves out what it cannot explain.";
         "one_body": Warning,
-            "In {count:row} the body deviates by up to {position} and {angle}, {ratio} times the usual; no motion between rows explains it[[; an error of joint {joints:or} alone would]].",
+            "In {count:row} the body deviates by up to {position}[[ and {angle}]], {ratio} times the usual; no motion between rows explains it[[; an error of joint {joints:or} alone would]].",
             "Look at these rows: a wrong reading, or backlash of that joint. The robust fit leaves out what it cannot explain.";
         "model": Warning,
             "In {count:row} the body deviates from the nominal robot by up to {position} and {angle}, {ratio} times the usual.",

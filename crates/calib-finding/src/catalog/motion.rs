@@ -31,7 +31,7 @@ super::topic! {
             "In {count:row} the body deviates from the robot's model by up to {position} and {angle}, {ratio} times the usual.",
             "Drop these rows, or synchronize the clocks: the robot had not settled, or tracker and robot were read at different times.";
         "between": Warning,
-            "In {count:row} the body deviates by up to {position} and {angle}; interpolating the joint values toward an adjacent row explains it ({fraction:percent} in the worst row).",
+            "In {count:row} the body deviates by up to {position}[[ and {angle}]]; interpolating the joint values toward an adjacent row explains it ({fraction:percent} in the worst row).",
             "Record again, in holds of a second: joints and tracker were read at different times, or the robot had not settled. The fit rejects these rows.";
     }
     /// Rows that stand in a recording twice.

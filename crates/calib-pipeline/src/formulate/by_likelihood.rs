@@ -5,7 +5,7 @@ use calib_finding::{About, Fact, Finding, Severity, Unit, catalog};
 use calib_report::{Status, Unobservable};
 
 use crate::error::PipelineError;
-use crate::formulate::bad_rows::bad_rows;
+use crate::formulate::bad_rows::{bad_rows, not_said};
 use crate::formulate::cameras::Outcome;
 use crate::formulate::checked::Checked;
 use crate::formulate::chosen::Chosen;
@@ -69,6 +69,7 @@ pub fn likelihood(
         of_rows.retain(|f| f.id == catalog::UNSETTLED_ROWS);
         of_rows.extend(again.2);
     }
+    let of_rows = not_said(of_rows, &checked.findings);
     checked.findings.extend(of_rows);
     progress("choose the noise");
     // A prior that the robot contradicts looks like noise, and the noise decides what the data say of a prior.

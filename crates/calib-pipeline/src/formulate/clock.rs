@@ -225,7 +225,11 @@ pub fn noticed(findings: &mut Vec<Finding>, inputs: &Inputs, fit: &MlFit) {
                     .clone()
                     .with("offset", Fact::seconds(clock.offset))
                     .with("sigma", Fact::seconds(sigma))
-                    .with("drift", Fact::ratio(clock.drift));
+                    .with("drift", Fact::ratio(clock.drift))
+                    .with(
+                        "sigma_drift",
+                        Fact::ratio(clock.drift_sigma.unwrap_or_default()),
+                    );
             }
         } else if alignment.unknowns() == ClockUnknowns::Offset
             && clock.offset.abs() > SAME_TIME.max(4.0 * sigma)

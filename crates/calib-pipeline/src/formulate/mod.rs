@@ -1,6 +1,7 @@
 //! The profile and the recordings as one likelihood problem.
 
 pub mod bad_rows;
+mod body_error;
 pub mod by_closed_forms;
 pub mod by_likelihood;
 pub mod cameras;
@@ -10,6 +11,7 @@ pub mod clock;
 pub(crate) mod completed;
 pub(crate) mod contact_directions;
 pub mod contacts;
+mod exchanged_poses;
 pub mod formulation;
 pub mod found;
 pub(crate) mod from_origins;

@@ -9,6 +9,7 @@ use calib_profile::{UpAxis, Usage};
 
 use crate::estimate::start::Start;
 use crate::formulate::contact_directions;
+use crate::formulate::exchanged_poses::put_right;
 use crate::formulate::row_checks::rows;
 use crate::formulate::structural::{keep_unexplained, structural};
 use crate::prepare::inputs::Inputs;
@@ -29,14 +30,21 @@ pub fn before_the_fit(
     if findings.iter().any(mixed) {
         return;
     }
-    let found = structural(inputs, tracks);
+    let mut found = structural(inputs, tracks);
+    let put_right = put_right(inputs, tracks, &found);
+    let (mut judged, mut of_judged) = (inputs, tracks);
+    if let Some(right) = &put_right {
+        (judged, of_judged) = (&right.inputs, &right.tracks);
+        found = right.structural.clone();
+        findings.extend(right.findings.iter().cloned());
+    }
     let recordings = inputs.recordings.iter();
     let fitted = recordings.filter(|(_, r)| r.spec.usage != Usage::Validation);
     let fitted: Vec<&String> = fitted.map(|(name, _)| name).collect();
     keep_unexplained(findings, &found.findings, &fitted);
     findings.extend(found.findings.iter().cloned());
     if found.rows_count {
-        findings.extend(rows(inputs, tracks, &found));
+        findings.extend(rows(judged, of_judged, &found));
     }
     findings.extend(contact_directions::missing(inputs));
     for (name, loaded) in &inputs.recordings {

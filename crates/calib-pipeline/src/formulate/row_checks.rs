@@ -73,11 +73,35 @@ struct Rows<'a> {
 
 /// Rows that deviate while no structural hypothesis stands out.
 #[must_use]
-pub fn rows<'a>(
+pub fn rows(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+    structural: &Structural,
+) -> Vec<Finding> {
+    let mut all = spoilt(inputs, tracks, structural);
+    if all.is_empty() {
+        return Vec::new();
+    }
+    let of_names = exchanged(&mut all);
+    let of_names = of_names.iter().map(|of| of.finding(inputs));
+    let mut findings: Vec<Finding> = of_names.collect();
+    let mut all = deviating(inputs, tracks, structural, &all);
+    findings.extend(in_several_bodies(inputs, &mut all));
+    for rows in &all {
+        match part_of_a_range(inputs, rows) {
+            Some(finding) => findings.push(finding),
+            None => findings.extend(row_findings(rows)),
+        }
+    }
+    findings
+}
+
+/// The rows of each body in each recording whose motions disagree with those of its link.
+fn spoilt<'a>(
     inputs: &'a Inputs,
     tracks: &'a BTreeMap<String, BodyTrack>,
     structural: &Structural,
-) -> Vec<Finding> {
+) -> Vec<Spoilt<'a>> {
     // A recording that a mistake explains as a whole has no deviating rows.
     let explained = |name: &str| {
         let mut all = structural.findings.iter();
@@ -117,20 +141,7 @@ pub fn rows<'a>(
             spoiled,
         })
     };
-    let mut all: Vec<Spoilt<'a>> = tables.par_iter().filter_map(spoilt).collect();
-    if all.is_empty() {
-        return Vec::new();
-    }
-    let mut findings = exchanged(inputs, &mut all);
-    let mut all = deviating(inputs, tracks, structural, &all);
-    findings.extend(in_several_bodies(inputs, &mut all));
-    for rows in &all {
-        match part_of_a_range(inputs, rows) {
-            Some(finding) => findings.push(finding),
-            None => findings.extend(row_findings(rows)),
-        }
-    }
-    findings
+    tables.par_iter().filter_map(spoilt).collect()
 }
 
 /// The findings of deviating rows, by how they deviate.
@@ -209,9 +220,44 @@ struct Spoilt<'a> {
     spoiled: Spoiled,
 }
 
-/// Rows in which two bodies are each where the other should be; they are taken out of `all`.
-fn exchanged(inputs: &Inputs, all: &mut [Spoilt<'_>]) -> Vec<Finding> {
-    let mut findings = Vec::new();
+/// Rows of a recording in which two bodies are each where the other should be.
+#[derive(Debug, Clone)]
+pub(super) struct Exchanged<'a> {
+    pub(super) loaded: &'a Loaded,
+    pub(super) bodies: [&'a str; 2],
+    pub(super) rows: BTreeSet<usize>,
+}
+
+impl Exchanged<'_> {
+    /// An error where so many rows are wrong that no robust fit leaves them all out.
+    pub(super) fn finding(&self, inputs: &Inputs) -> Finding {
+        let few = self.rows.len() as f64 <= FEW * self.loaded.poses.len() as f64;
+        let kind = match few && inputs.robot.profile.solve.robust {
+            true => "exchanged_few",
+            false => "exchanged",
+        };
+        let subject = Subject::recording(&self.loaded.name);
+        let [first, second] = self.bodies;
+        Finding::of_kind(catalog::ROW_OUTLIER, kind, subject)
+            .with("count", Fact::count(self.rows.len()))
+            .with("first", Fact::name(first))
+            .with("second", Fact::name(second))
+            .at_rows(self.rows.iter().map(|row| self.loaded.poses.rows[*row]))
+    }
+}
+
+/// Rows in which two bodies are each where the other should be.
+pub(super) fn exchanged_rows<'a>(
+    inputs: &'a Inputs,
+    tracks: &'a BTreeMap<String, BodyTrack>,
+    structural: &Structural,
+) -> Vec<Exchanged<'a>> {
+    exchanged(&mut spoilt(inputs, tracks, structural))
+}
+
+/// The same among rows that disagree; they are taken out of `all`.
+fn exchanged<'a>(all: &mut [Spoilt<'a>]) -> Vec<Exchanged<'a>> {
+    let mut found = Vec::new();
     for k in 0..all.len() {
         for other in k + 1..all.len() {
             let (before, from) = all.split_at_mut(other);
@@ -226,21 +272,14 @@ fn exchanged(inputs: &Inputs, all: &mut [Spoilt<'_>]) -> Vec<Finding> {
             for of in [&mut *first, &mut *second] {
                 of.spoiled.rows.retain(|row| !rows.contains(&row.row));
             }
-            let kind = match few(inputs, first.loaded, rows.len()) {
-                true => "exchanged_few",
-                false => "exchanged",
-            };
-            let subject = Subject::recording(&first.loaded.name);
-            findings.push(
-                Finding::of_kind(catalog::ROW_OUTLIER, kind, subject)
-                    .with("count", Fact::count(rows.len()))
-                    .with("first", Fact::name(first.body))
-                    .with("second", Fact::name(second.body))
-                    .at_rows(rows.iter().map(|row| first.loaded.poses.rows[*row])),
-            );
+            found.push(Exchanged {
+                loaded: first.loaded,
+                bodies: [first.body, second.body],
+                rows,
+            });
         }
     }
-    findings
+    found
 }
 
 impl Spoilt<'_> {
