@@ -177,3 +177,89 @@ fn a_joint_that_was_held_elsewhere_in_one_sweep_is_named() {
         }
     }
 }
+
+/// A finger of 120 mm beside a palm: 10 mm of nominal errors hide what a joint does.
+const FINGER: &str = r#"<robot name="finger">
+  <link name="palm"/><link name="base"/><link name="proximal"/><link name="middle"/>
+  <joint name="spread" type="revolute"><parent link="palm"/><child link="base"/><origin xyz="0.07 0 0"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+  <joint name="bend" type="revolute"><parent link="base"/><child link="proximal"/><origin xyz="0.015 0 0"/><axis xyz="0 1 0"/><limit lower="-0.5" upper="2" effort="1" velocity="1"/></joint>
+  <joint name="curl" type="revolute"><parent link="proximal"/><child link="middle"/><origin xyz="0.045 0 0"/><axis xyz="0 1 0"/><limit lower="-0.5" upper="2" effort="1" velocity="1"/></joint>
+</robot>
+"#;
+
+/// The column of a finger's joint stands from one row on: its rows take no part in the fit, and nothing else is said to have changed.
+#[test]
+fn a_column_that_stands_from_a_row_on_is_named_on_a_finger() {
+    let finger = |tip: &[&str], seed: u64| {
+        let places = ["[24, 2, 7]", "[10, 9, 4]", "[12, -8, 5]", "[4, 0, 13]"];
+        let tips: Vec<String> = tip
+            .iter()
+            .zip(places)
+            .map(|(marker, place)| format!("{marker}: {place}"))
+            .collect();
+        let profile = format!(
+            "calib: 1
+robot: {{name: finger, urdf: finger.urdf}}
+tracker: {{frame: lab, marker_sigma_mm: 0.2}}
+bodies:
+  hand: {{link: palm, markers: [h1, h2, h3, h4]}}
+  tip: {{link: middle, markers: [{}]}}
+recordings:
+  poses: {{file: poses.csv, use: static}}
+  checks: {{file: checks.csv, use: validation}}
+solve:
+  free: [bodies, tracker, joint_offsets, joint_axes]
+  limits: {{held_out_rms_mm: 1.2}}
+simulate:
+  seed: {seed}
+  tracker_from_root: {{xyz_mm: [900, 300, 100], rpy_deg: [5, -11, 40]}}
+  mounts:
+    hand: {{xyz_mm: [0, 0, 10], markers_mm: {{h1: [0, 30, 0], h2: [-40, -30, 2], h3: [20, -40, 20], h4: [-20, 10, 40]}}}}
+    tip: {{xyz_mm: [0, 0, 0], markers_mm: {{{}}}}}
+  errors: {{joint_offset_deg: 0.3, axis_mm: 0.2, axis_deg: 0.2}}
+  noise: {{marker_mm: 0.2, joint_deg: 0.01}}
+  recordings:
+    poses: {{random: {{spread_deg: [-23, 23], bend_deg: [0, 86], curl_deg: [0, 86]}}, poses: 40}}
+    checks: {{random: {{spread_deg: [-23, 23], bend_deg: [0, 86], curl_deg: [0, 86]}}, poses: 15}}
+",
+            tip.join(", "),
+            tips.join(", "),
+        );
+        let dir = Scratch::new()
+            .file("finger.urdf", FINGER)
+            .file("finger.yaml", profile);
+        dir.calib(["simulate", "finger.yaml", "--out", "."])
+            .expect(0);
+        dir
+    };
+    let found = |dir: &Scratch| -> Vec<serde_json::Value> {
+        let run = dir.calib(["run", "finger.yaml", "--out", "out"]);
+        assert_eq!(run.code, 0, "{}", run.stdout);
+        let report = dir.json("out/report.json");
+        let all = report["findings"].as_array().expect("a list");
+        let warnings = all.iter().filter(|f| f["severity"] != "info");
+        warnings.cloned().collect()
+    };
+    for (seed, joint) in (1..).zip(["spread", "bend", "curl"]) {
+        for tip in [&["t1", "t2", "t3", "t4"][..], &["t1"]] {
+            let clean = found(&finger(tip, seed));
+            assert!(clean.is_empty(), "{clean:#?}");
+            let stands = std::cell::Cell::new(None);
+            let dir = finger(tip, seed).cells("poses.csv", |row, column, cell| {
+                let value = cell.parse::<f64>().ok();
+                if column != format!("{joint}_deg") || value.is_none() {
+                    return cell.to_owned();
+                }
+                if row <= 24 {
+                    stands.set(value);
+                }
+                stands.get().expect("a value").to_string()
+            });
+            let all = found(&dir);
+            let [one] = &all[..] else { panic!("{all:#?}") };
+            assert_eq!(one["id"], "joint-never-moved", "{one}");
+            assert_eq!(one["facts"]["kind"], "although_in_rows", "{one}");
+            assert_eq!(one["about"]["name"], joint, "{one}");
+        }
+    }
+}

@@ -16,6 +16,7 @@ use crate::formulate::bad_rows::{bad_rows, is_judged, not_said};
 use crate::formulate::by_likelihood::only_a_cross_check;
 use crate::formulate::completed::beside;
 use crate::formulate::formulation::{FreeSet, MlFit};
+use crate::formulate::stuck::without_stuck;
 use crate::formulate::{held, ml, model_checks};
 use crate::options::Plugins;
 use crate::output::of_data::{coverage, lost, used_for};
@@ -115,12 +116,17 @@ fn single_rows(
         return Ok(());
     }
     let fit = ml::fit(stated, inputs, &settings)?;
-    let bad = bad_rows(inputs, tracks, &fit);
-    if bad.findings.is_empty() && !suspected {
+    let (mut inputs, mut tracks) = (inputs.clone(), tracks.clone());
+    let of_stuck = without_stuck(&mut inputs, &mut tracks, start, fit, &settings)?;
+    of_stuck.leave_out_explained(findings);
+    let (fit, bad) = (of_stuck.fit, of_stuck.bad);
+    if bad.findings.is_empty() && of_stuck.findings.is_empty() && !suspected {
         return Ok(());
     }
-    let rows = beside(inputs, (tracks, findings), &fit, &settings).map_or(bad, |beside| beside.bad);
-    let causes = causes(inputs, &fit, findings, None);
+    let known = (&tracks, &findings[..]);
+    let rows = beside(&inputs, known, &fit, &settings).map_or(bad, |beside| beside.bad);
+    findings.extend(of_stuck.findings);
+    let causes = causes(&inputs, &fit, findings, None);
     causes.leave_unexplained(findings);
     let rows = not_said(rows.findings, findings);
     findings.extend(rows);

@@ -129,6 +129,8 @@ pub enum RejectedFor {
     RestlessHold,
     /// Its joint readings are those of an earlier row, and the body had moved meanwhile.
     HeldReadings,
+    /// The readings of one joint are those of earlier rows, and the joint had moved meanwhile.
+    StuckReading,
     /// The whole body is off, markers together.
     NotSettled,
     /// A pose needed to predict it was lost.

@@ -7,14 +7,15 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use calib_finding::{Fact, Finding, Subject, catalog};
-use calib_profile::Usage;
+use calib_profile::{Body, Usage};
+use calib_report::RejectedFor;
 use calib_urdf::RobotModel;
 
 use crate::formulate::body_error::{BodyError, FarOff, OnTheWay, Usual, usual_of};
 use crate::formulate::formulation::MlFit;
 use crate::formulate::row_checks::Exchanged;
 use crate::formulate::row_levels::{RowLevel, row_levels};
-use crate::formulate::standing::{OneJoint, standing};
+use crate::formulate::standing::{OneJoint, Standing, standing};
 use crate::formulate::starts::rows_of_no_side;
 use crate::prepare::conditions::conditions;
 use crate::prepare::excluded::Excluded;
@@ -28,6 +29,8 @@ pub struct BadRows {
     pub findings: Vec<Finding>,
     /// Rows that lie on the way to a neighbor: joints and tracker were not read at the same time.
     pub unsettled: Vec<Excluded>,
+    /// Rows in which the readings of a joint stand although it moved.
+    pub stuck: Vec<Excluded>,
 }
 
 /// Whether single rows of a recording are judged. Where rows follow each other in time, a lag is the clock's, and every row has one.
@@ -83,8 +86,6 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
                     None => others.extend(off.far_off(loaded, row, usual).map(|w| (row, w))),
                 }
             }
-            bad.findings
-                .extend(unsettled_finding(recording, off.name, loaded, &moving));
             let explained: Vec<(usize, OneJoint)> = others
                 .iter()
                 .filter_map(|(row, off)| Some((*row, off.joint?)))
@@ -92,18 +93,42 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
             if let Some(standing) = standing(model, loaded, &explained) {
                 others.retain(|(row, _)| !standing.rows.contains(row));
                 bad.findings.push(standing.finding(model, off.name, loaded));
+                if standing.is_in_rows(loaded) {
+                    others.retain(|(row, _)| !standing.run.contains(row));
+                    moving.retain(|(row, _)| !standing.run.contains(row));
+                    bad.stuck.extend(stuck(inputs, recording, &standing));
+                }
             }
+            bad.findings
+                .extend(unsettled_finding(recording, off.name, loaded, &moving));
             bad.findings
                 .extend(outlier_finding(model, off.name, loaded, &others));
             bad.unsettled.extend(moving.iter().map(|(row, _)| Excluded {
                 recording: recording.clone(),
                 row: *row,
                 body: off.name.to_owned(),
-                cause: calib_report::RejectedFor::OnTheWay,
+                cause: RejectedFor::OnTheWay,
             }));
         }
     }
     bad
+}
+
+/// What of the rows shows the joint: all bodies behind it.
+fn stuck(inputs: &Inputs, recording: &str, standing: &Standing) -> Vec<Excluded> {
+    let model = &inputs.robot.model;
+    let bodies = inputs.robot.profile.bodies.iter();
+    let behind = bodies.filter(|(_, b)| model.chain_to_root(b.link).contains(&standing.joint));
+    let of_body = |(name, _): (&String, &Body)| -> Vec<Excluded> {
+        let row = |row| Excluded {
+            recording: recording.to_owned(),
+            row,
+            body: name.clone(),
+            cause: RejectedFor::StuckReading,
+        };
+        standing.run.clone().map(row).collect()
+    };
+    behind.flat_map(of_body).collect()
 }
 
 /// Findings without those that `said` holds already: bodies whose names were exchanged are found by their motions, and again beside a fit.

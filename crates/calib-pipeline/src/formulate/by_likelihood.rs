@@ -5,7 +5,7 @@ use calib_finding::{About, Fact, Finding, Severity, Unit, catalog};
 use calib_report::{Status, Unobservable};
 
 use crate::error::PipelineError;
-use crate::formulate::bad_rows::{bad_rows, not_said};
+use crate::formulate::bad_rows::not_said;
 use crate::formulate::cameras::Outcome;
 use crate::formulate::checked::Checked;
 use crate::formulate::chosen::Chosen;
@@ -16,6 +16,7 @@ use crate::formulate::memory::with_memory;
 use crate::formulate::ml;
 use crate::formulate::realign::realign;
 use crate::formulate::solved::Solved;
+use crate::formulate::stuck::without_stuck;
 use crate::formulate::{
     cameras, clock, gain_or_scale, gear_ratio, noise, priors, row_levels, starts, wanted,
 };
@@ -192,7 +193,10 @@ fn fits(
     };
     let mut findings = Vec::new();
     if settings.robust.enabled {
-        let mut bad = bad_rows(inputs, &checked.tracks, &fit);
+        let of_stuck = without_stuck(inputs, &mut checked.tracks, &checked.start, fit, &alone)?;
+        of_stuck.leave_out_explained(&mut checked.findings);
+        let mut bad = of_stuck.bad;
+        fit = of_stuck.fit;
         let mut complete = None;
         if !bad.findings.is_empty() || !fit.solution.rejects_by_chance(&alone) {
             progress("judge rows beside what the model lacks");
@@ -204,7 +208,8 @@ fn fits(
                 }
             }
         }
-        findings = bad.findings;
+        findings = of_stuck.findings;
+        findings.extend(bad.findings);
         let unsettled = !bad.unsettled.is_empty();
         // What the model lacks is no gross error of the rows that show it.
         let explained = complete.and_then(|c| fit.solution.with_kept_of(&c.solution, &alone));

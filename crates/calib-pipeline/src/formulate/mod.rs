@@ -35,5 +35,6 @@ pub mod solved;
 mod standing;
 pub(crate) mod starts;
 pub mod structural;
+pub(crate) mod stuck;
 mod wanted;
 pub mod without_effects;

@@ -1,9 +1,10 @@
-//! A joint that moved although all its readings in a recording are the same.
+//! A joint that moved although its readings stand: in a recording, or in some of its rows that follow each other.
 //!
 //! An error of this joint alone explains rows that a fit left out, and is another one from row to row. A body that slipped once on its link, or a joint that
 //! stood elsewhere, is off by the same in all of them.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_urdf::{JointId, JointKind, RobotModel};
@@ -27,11 +28,13 @@ pub(super) struct OneJoint {
 
 /// The joint, and the rows that its motion explains.
 pub(super) struct Standing {
-    joint: JointId,
-    /// Its reading in all rows, rad or m.
+    pub(super) joint: JointId,
+    /// Its reading, rad or m.
     at: f64,
     /// From the first to the last of its places, rad or m.
     moved: f64,
+    /// The rows that have this reading.
+    pub(super) run: Range<usize>,
     pub(super) rows: Vec<usize>,
 }
 
@@ -45,12 +48,14 @@ pub(super) fn standing(
     for (row, of) in explained {
         by_joint.entry(of.joint).or_default().push((*row, of.step));
     }
-    let (joint, steps) = by_joint.into_iter().max_by_key(|(_, rows)| rows.len())?;
-    let mut readings = loaded.q.iter().flatten().map(|q| q[joint.index()]);
-    let at = readings.next()?;
-    if 2 * steps.len() < explained.len() || !readings.all(|reading| reading == at) {
+    let (joint, mut steps) = by_joint.into_iter().max_by_key(|(_, rows)| rows.len())?;
+    let within = |run: &Range<usize>| steps.iter().filter(|(row, _)| run.contains(row)).count();
+    let run = runs(loaded, joint).into_iter().max_by_key(within)?;
+    steps.retain(|(row, _)| run.contains(row));
+    if 2 * steps.len() < explained.len() {
         return None;
     }
+    let at = loaded.q[run.start].as_ref()?[joint.index()];
     let apart = if turns(model, joint) {
         APART.0
     } else {
@@ -60,26 +65,53 @@ pub(super) fn standing(
     let mut places: Vec<f64> = steps.iter().map(|(_, step)| *step).chain([0.0]).collect();
     places.sort_by(f64::total_cmp);
     let count = 1 + places.windows(2).filter(|w| w[1] - w[0] > apart).count();
-    (count >= PLACES).then(|| Standing {
+    let standing = Standing {
         joint,
         at,
         moved: places[places.len() - 1] - places[0],
+        run,
         rows: steps.iter().map(|(row, _)| *row).collect(),
-    })
+    };
+    // In sweeps of other joints a reading stands in some rows by itself.
+    let enough = steps.len() >= PLACES || !standing.is_in_rows(loaded);
+    (count >= PLACES && enough).then_some(standing)
+}
+
+/// Rows that follow each other with the same reading of a joint.
+fn runs(loaded: &Loaded, joint: JointId) -> Vec<Range<usize>> {
+    let reading = |row: usize| Some(loaded.q[row].as_ref()?[joint.index()]);
+    let mut runs: Vec<Range<usize>> = Vec::new();
+    for row in (0..loaded.q.len()).filter(|row| loaded.q[*row].is_some()) {
+        match runs.last_mut() {
+            Some(run) if reading(run.start) == reading(row) => run.end = row + 1,
+            _ => runs.push(row..row + 1),
+        }
+    }
+    runs
 }
 
 impl Standing {
+    /// Whether the reading is another one in other rows.
+    pub(super) fn is_in_rows(&self, loaded: &Loaded) -> bool {
+        let mut others = loaded.q.iter().flatten();
+        others.any(|q| q[self.joint.index()] != self.at)
+    }
+
     pub(super) fn finding(&self, model: &RobotModel, body: &str, loaded: &Loaded) -> Finding {
         let size = match turns(model, self.joint) {
             true => Fact::radians,
             false => Fact::meters,
         };
+        let (kind, of) = match self.is_in_rows(loaded) {
+            true => ("although_in_rows", self.run.len()),
+            false => ("although", loaded.q.len()),
+        };
         let rows = self.rows.iter();
         let subject = Subject::joint(&model.joint(self.joint).name).in_recording(&loaded.name);
-        Finding::of_kind(catalog::JOINT_NEVER_MOVED, "although", subject)
+        Finding::of_kind(catalog::JOINT_NEVER_MOVED, kind, subject)
             .with("at", size(self.at))
             .with("count", Fact::count(self.rows.len()))
-            .with("of", Fact::count(loaded.q.len()))
+            .with("of", Fact::count(of))
             .with("body", Fact::name(body))
             .with("moved", size(self.moved))
             .at_rows(rows.map(|row| loaded.poses.rows[*row]))
