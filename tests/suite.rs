@@ -76,4 +76,5 @@ mod urdf_out;
 mod verdict;
 mod view;
 mod work;
+mod wrong_axes;
 mod zero_changed;

@@ -10,6 +10,8 @@ use super::hypothesis::{
 };
 use super::ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex};
 use super::order::ColumnOrder;
+use super::scan::Scan;
+use super::thinning::thinned;
 
 /// A column whose values differ by less (rad or m) carries no information about its own sign or unit.
 const MOVES: f64 = 1e-6;
@@ -28,6 +30,7 @@ pub(crate) fn candidates(data: &Data) -> Vec<Candidate> {
     let everywhere = everywhere(data);
     let mut list: Vec<Candidate> = Vec::new();
     of_readings(data, &everywhere, &mut list);
+    list.extend(possible_axes(data));
     of_claims(data, &parts, &mut list);
     of_tracker(data, &everywhere, &parts, &mut list);
     of_missing(data, &mut list);
@@ -251,7 +254,7 @@ pub(crate) fn of_still(data: &Data) -> Vec<Candidate> {
 
 /// Axes of joints along other coordinates than the model has them: a URDF has `1 0 0` where none is written. A reversed axis is the sign of the joint; only
 /// of a joint that follows another one, which has no sign of its own, it is the multiplier. An axis between coordinates was written with care.
-pub(crate) fn of_axes(data: &Data) -> Vec<Candidate> {
+fn of_axes(data: &Data) -> Vec<Candidate> {
     /// A cosine from which on a direction is that of a coordinate axis.
     const ALONG: f64 = 1.0 - 1e-6;
     let bodies = data.bodies.iter();
@@ -281,6 +284,23 @@ pub(crate) fn of_axes(data: &Data) -> Vec<Candidate> {
             others.map(move |along| (Hypothesis::Axis { joint, along }, vec![Scope::All]))
         })
         .collect()
+}
+
+/// Axes of joints that some of the rows allow: most are far from all of them.
+fn possible_axes(data: &Data) -> Vec<Candidate> {
+    /// Rows that are looked at.
+    const ROWS: usize = 60;
+    /// An axis that leaves more than this many times the residual of the data as they are explains nothing.
+    const MOST: f64 = 1.2;
+    let mut axes = of_axes(data);
+    let part = data.select(&thinned(data, ROWS));
+    let scan = Scan::new(&part, &[]);
+    let most = MOST * scan.none().score;
+    axes.retain(|(hypothesis, scopes)| {
+        let scored = scan.score(hypothesis, scopes, most);
+        scored.iter().any(|s| s.score.score <= most)
+    });
+    axes
 }
 
 fn of_missing(data: &Data, list: &mut Vec<Candidate>) {

@@ -3,12 +3,13 @@
 use rayon::prelude::*;
 
 use super::apply::{apply, apply_all};
+use super::axes::{several_axes, together};
 use super::candidates::{Candidate, candidates, span};
 use super::continuous;
 use super::data::{Data, DataError};
 use super::expected::expected;
 use super::few;
-use super::further::further;
+use super::further::{Leads, Signs, further};
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{JointIndex, SampleIndex};
 use super::jump::jump;
@@ -130,10 +131,11 @@ fn decided(asked: &Asked<'_>, outcome: &mut Outcome) -> Correction {
     } = *asked;
     outcome.expected = expected(data, screened, options);
     let wrong = outcome.expected.is_some_and(|e| ranking.none.rms > e.limit);
-    // A frame of its own explains what one zero may explain as well.
-    let leads = |s: &Scored| s.scoped.hypothesis.is_frame() && ranking.ratio(s.score.score) > 1.0;
-    let frame = ranking.scored.first().is_some_and(leads);
-    let more = further(data, screened, options, wrong, frame);
+    let signs = Signs {
+        wrong,
+        leads: leads(ranking, options),
+    };
+    let more = further(data, screened, options, signs);
     let mut of_more = Ranking::of(data, &more, screened);
     if !wrong {
         // A place that is off by a few degrees is an error that the fit finds.
@@ -165,6 +167,17 @@ fn decided(asked: &Asked<'_>, outcome: &mut Outcome) -> Correction {
             ..
         } => named.correction.clone(),
         _ => Vec::new(),
+    }
+}
+
+/// What leads that one zero, gain or share may explain as well.
+fn leads(ranking: &Ranking, options: &Options) -> Leads {
+    let first = ranking.scored.first();
+    let ratio = first.map_or(1.0, |s| ranking.ratio(s.score.score));
+    match first.map(|s| s.scoped.hypothesis) {
+        Some(h) if h.is_frame() && ratio > 1.0 => Leads::Frame,
+        Some(Hypothesis::Axis { .. }) if ratio >= options.runner_up_ratio => Leads::Axis,
+        _ => Leads::Other,
     }
 }
 
@@ -261,6 +274,8 @@ fn screened_ranking(data: &Data, candidates: &[Candidate]) -> (Ranking, Vec<Samp
     for _ in 0..SCREENINGS {
         let mut leaders: Vec<Correction> = vec![Vec::new()];
         leaders.extend(distinct(&ranking.scored, SCREENED_LEADERS).map(|s| vec![s.scoped]));
+        let axes = Some(together(data, candidates, &ranking, &screened));
+        leaders.extend(axes.filter(|axes| !axes.is_empty()));
         let found: Vec<Screened> = leaders
             .par_iter()
             .map(|leader| screen(data, leader))
@@ -311,6 +326,12 @@ fn decide(asked: &Asked<'_>, outcome: &Outcome) -> Decision {
     let few = few_samples(asked.data, asked.screened);
     let single = best.filter(|_| best_ratio >= options.name_ratio * few);
     let single = single.map(|best| asked.with_expected(asked.name(best)));
+    // Two at once are a pair, where something stands out.
+    let axes = several_axes(asked).map(|axes| asked.with_expected(axes));
+    let beyond_pairs = |axes: &Named| axes.correction.len() > 2 || single.is_none() && !alarm;
+    if let Some(axes) = axes.filter(|axes| beyond_pairs(axes) && settled(axes, options)) {
+        return Decision::Named(axes);
+    }
     // A cloud of points in a wrong unit of length looks like a body on a link that does not move.
     let settled_by_residual = single
         .as_ref()

@@ -1,6 +1,6 @@
 //! Candidates that are asked beside those of every recording, where something speaks for them.
 
-use super::candidates::{Candidate, of_axes, of_still};
+use super::candidates::{Candidate, of_still};
 use super::data::Data;
 use super::hypothesis::{Hypothesis, Scope};
 use super::ids::{RecordingIndex, SampleIndex};
@@ -9,14 +9,31 @@ use super::scan::Scan;
 use super::sized;
 use super::special;
 
-/// Joints that never moved, since no other data say where they stood, in all recordings or in one that is unlike the others; where something is `wrong`,
-/// in any, axes of the model, zeros, gains and couplings; those of single recordings also where the tracker or a body seems to have moved (`frame`).
+/// The hypothesis that leads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Leads {
+    /// The tracker or a body seems to have moved.
+    Frame,
+    /// A joint seems to have another axis.
+    Axis,
+    Other,
+}
+
+/// What speaks for more candidates.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Signs {
+    /// Nominal errors do not explain the residual.
+    pub wrong: bool,
+    pub leads: Leads,
+}
+
+/// Joints that never moved, since no other data say where they stood, in all recordings or in one that is unlike the others; where something is wrong,
+/// in any, zeros, gains and couplings, which are also rivals of an axis that leads; those of single recordings also of a frame that leads.
 pub(super) fn further(
     data: &Data,
     screened: &[SampleIndex],
     options: &Options,
-    wrong: bool,
-    frame: bool,
+    Signs { wrong, leads }: Signs,
 ) -> Vec<Candidate> {
     let suspects = &options.suspects;
     let mut more = of_still(data);
@@ -42,14 +59,12 @@ pub(super) fn further(
         }
     }
     more.retain(|(_, scopes)| !scopes.is_empty());
-    if wrong && suspects.is_empty() {
-        more.extend(of_axes(data));
-    }
-    if wrong || frame {
+    if wrong || leads != Leads::Other {
+        let everywhere = wrong || leads == Leads::Axis;
         let of_sizes = sized::of_sizes(data, screened, options);
         let asked = |scope: &Scope| match scope {
             // One that only the suspects show may be everywhere.
-            Scope::All => wrong,
+            Scope::All => everywhere,
             Scope::Recording(r) => suspects.is_empty() || suspects.contains(r),
             Scope::AllExcept(_) => wrong && suspects.is_empty(),
         };

@@ -49,6 +49,7 @@
 //! ```
 
 mod apply;
+mod axes;
 mod candidates;
 mod chain;
 mod channels;
