@@ -868,7 +868,7 @@ fn every_outcome_of_an_alignment_is_said() {
     let lag = alignment(&OffsetOutcome::Found(map), 1e-3).expect("3.9 s");
     assert_eq!(
         lag.text(),
-        "The tracker's clock is 3900.00 ± 0.20 ms ahead of the robot's and runs 50 ppm faster."
+        "The tracker's clock is 3900.00 ± 0.20 ms ahead of the robot's and runs 50.0 ± 1.0 ppm faster."
     );
     assert!(
         alignment(
