@@ -281,7 +281,9 @@ impl Spoiled {
         let seen = tracker_from_body.get(row)?.as_ref()?;
         let size = size(tracker_from_body);
         let good: Vec<usize> = (0..base_from_link.len())
-            .filter(|other| *other != row && self.rows.iter().all(|r| r.row != *other))
+            .filter(|other| {
+                *other != row && self.rows.binary_search_by_key(other, |r| r.row).is_err()
+            })
             .collect();
         let others = good.iter().step_by(good.len().div_ceil(COMPARED).max(1));
         let off = others.filter_map(|&other| {

@@ -12,7 +12,7 @@ use calib_report::{BodyNoise, CheckOutcome, Checked, CheckedRecording, DataCheck
 use crate::error::{ExitCode, PipelineError};
 use crate::estimate::paper;
 use crate::estimate::start::{Start, start};
-use crate::formulate::bad_rows::{bad_rows, is_judged, not_said};
+use crate::formulate::bad_rows::{bad_rows, is_judged, say};
 use crate::formulate::by_likelihood::only_a_cross_check;
 use crate::formulate::completed::beside;
 use crate::formulate::formulation::{FreeSet, MlFit};
@@ -117,7 +117,7 @@ fn single_rows(
     }
     let fit = ml::fit(stated, inputs, &settings)?;
     let (mut inputs, mut tracks) = (inputs.clone(), tracks.clone());
-    let of_stuck = without_stuck(&mut inputs, &mut tracks, start, fit, &settings)?;
+    let of_stuck = without_stuck(&mut inputs, &mut tracks, start, fit, &settings);
     of_stuck.leave_out_explained(findings);
     let (fit, bad) = (of_stuck.fit, of_stuck.bad);
     if bad.findings.is_empty() && of_stuck.findings.is_empty() && !suspected {
@@ -128,8 +128,7 @@ fn single_rows(
     findings.extend(of_stuck.findings);
     let causes = causes(&inputs, &fit, findings, None);
     causes.leave_unexplained(findings);
-    let rows = not_said(rows.findings, findings);
-    findings.extend(rows);
+    say(findings, rows.findings);
     // `calib run` decides what it does to the result.
     let change = causes.change.or(causes.scatter);
     findings.extend(change.map(|f| f.with_severity(Severity::Warning)));

@@ -328,8 +328,12 @@ fn decide(asked: &Asked<'_>, outcome: &Outcome) -> Decision {
     let single = single.map(|best| asked.with_expected(asked.name(best)));
     // Two at once are a pair, where something stands out.
     let axes = several_axes(asked).map(|axes| asked.with_expected(axes));
-    let beyond_pairs = |axes: &Named| axes.correction.len() > 2 || single.is_none() && !alarm;
-    if let Some(axes) = axes.filter(|axes| beyond_pairs(axes) && settled(axes, options)) {
+    let better_than_pairs = |axes: &Named| match axes.correction.len() {
+        2 => single.is_none() && !alarm,
+        _ => name_pair(asked).is_none_or(|pair| axes.evidence.ratio >= pair.evidence.ratio),
+    };
+    let explains = |axes: &Named| axes.within_expected != Some(false) && axes.verified(options);
+    if let Some(axes) = axes.filter(|axes| explains(axes) && better_than_pairs(axes)) {
         return Decision::Named(axes);
     }
     // A cloud of points in a wrong unit of length looks like a body on a link that does not move.

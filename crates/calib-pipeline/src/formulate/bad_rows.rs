@@ -67,6 +67,7 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
     let judged: Vec<Judged<'_>> = judged.collect();
     let exchanged = exchanged(inputs, &judged, &mut bad.findings);
     let model = &inputs.robot.model;
+    let mut known: BTreeSet<RowOfBody> = BTreeSet::new();
     for Judged { off, rows, usual } in &judged {
         for (recording, loaded) in inputs.recordings.iter().filter(|(_, r)| is_judged(r)) {
             let Some(&usual) = usual.get(recording) else {
@@ -96,7 +97,11 @@ pub fn bad_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, fit: &MlF
                 if standing.is_in_rows(loaded) {
                     others.retain(|(row, _)| !standing.run.contains(row));
                     moving.retain(|(row, _)| !standing.run.contains(row));
-                    bad.stuck.extend(stuck(inputs, recording, &standing));
+                    for out in stuck(inputs, recording, &standing) {
+                        if known.insert((out.recording.clone(), out.row, out.body.clone())) {
+                            bad.stuck.push(out);
+                        }
+                    }
                 }
             }
             bad.findings
@@ -131,19 +136,23 @@ fn stuck(inputs: &Inputs, recording: &str, standing: &Standing) -> Vec<Excluded>
     behind.flat_map(of_body).collect()
 }
 
-/// Findings without those that `said` holds already: bodies whose names were exchanged are found by their motions, and again beside a fit.
-pub(crate) fn not_said(mut findings: Vec<Finding>, said: &[Finding]) -> Vec<Finding> {
+/// Adds what is found beside a fit to what was `said`: of bodies whose names were exchanged, the finding that has more rows stays.
+pub(crate) fn say(said: &mut Vec<Finding>, findings: Vec<Finding>) {
     let pair = |f: &Finding| {
-        Some((
-            f.facts.get("first")?.clone(),
-            f.facts.get("second")?.clone(),
-        ))
+        let (first, second) = (f.facts.get("first")?, f.facts.get("second")?);
+        Some((first.clone(), second.clone()))
     };
-    let is_same = |a: &Finding, b: &Finding| {
-        a.id == b.id && a.subject == b.subject && pair(a).is_some() && pair(a) == pair(b)
-    };
-    findings.retain(|f| !said.iter().any(|s| is_same(f, s)));
-    findings
+    for finding in findings {
+        let is_same = |s: &&mut Finding| {
+            let same = s.id == finding.id && s.subject == finding.subject;
+            same && pair(s).is_some() && pair(s) == pair(&finding)
+        };
+        match said.iter_mut().find(is_same) {
+            Some(earlier) if finding.rows.len() > earlier.rows.len() => *earlier = finding,
+            Some(_) => {}
+            None => said.push(finding),
+        }
+    }
 }
 
 /// A body, and the rows in which the fit left it out.

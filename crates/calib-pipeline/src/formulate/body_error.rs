@@ -1,6 +1,6 @@
 //! The error of a body in one row under a fit, and what explains it.
 //!
-//! Such a row is compared with the motion to its neighbors,
+//! A row that is off is compared with the motion to its neighbors,
 //!
 //! ```text
 //! e(q_i + f (q_k − q_i)),   k = i ± 1,   f minimizes |e|                                              (1)
@@ -27,6 +27,9 @@ use crate::prepare::tracks::BodyTrack;
 const BETTER: f64 = 9.0;
 /// Largest part of the way to a neighbor: beyond it the row would belong to the other posture.
 const LARGEST_FRACTION: f64 = 0.5;
+/// A row is named where it is off by so many times the largest error of those that take part: no tracker's noise ends as that of Gauss does, and a row
+/// just beyond the others is one of them.
+const BEYOND: f64 = 1.5;
 /// Median and σ of the length of a Gaussian 3-vector: √χ²₃(½).
 const MEDIAN_OF_THREE: f64 = 1.538;
 
@@ -56,6 +59,19 @@ pub(super) struct Usual {
     turn: Option<f64>,
     /// Of the position, m.
     shift: f64,
+    /// The largest error of a row that takes part, in units of what is usual.
+    largest: f64,
+}
+
+impl Usual {
+    /// An error in units of what is usual.
+    fn ratio(&self, turn: Option<f64>, shift: f64) -> Option<f64> {
+        let shift = shift / self.shift;
+        Some(match turn {
+            Some(turn) => shift.hypot(turn / self.turn?) / OF_POSES.median,
+            None => shift / OF_MARKERS.median,
+        })
+    }
 }
 
 /// Size of the rotation errors, where they are seen, and the position errors of rows, by recording.
@@ -66,17 +82,21 @@ pub(super) fn usual_of(sizes: &Sizes<'_>, of: &dyn Fn(&String) -> bool) -> Optio
     /// Rows from which a median is worth something.
     const ENOUGH: usize = 8;
     let of = sizes.iter().filter(|(recording, _)| of(recording));
-    let (turns, mut shifts): (Vec<Option<f64>>, Vec<f64>) =
-        of.flat_map(|(_, rows)| rows).copied().unzip();
-    let mut turns: Vec<f64> = turns.into_iter().flatten().collect();
-    let middle = |all: &mut Vec<f64>| {
-        let median = upper_median(all)?;
+    let all: Vec<(Option<f64>, f64)> = of.flat_map(|(_, rows)| rows).copied().collect();
+    let middle = |mut all: Vec<f64>| {
+        let median = upper_median(&mut all)?;
         (all.len() >= ENOUGH && median > 0.0).then_some(median / MEDIAN_OF_THREE)
     };
-    Some(Usual {
-        turn: middle(&mut turns),
-        shift: middle(&mut shifts)?,
-    })
+    let usual = Usual {
+        turn: middle(all.iter().filter_map(|(turn, _)| *turn).collect()),
+        shift: middle(all.iter().map(|(_, shift)| *shift).collect())?,
+        largest: 0.0,
+    };
+    let ratios = all
+        .iter()
+        .filter_map(|(turn, shift)| usual.ratio(*turn, *shift));
+    let largest = ratios.fold(0.0, f64::max);
+    Some(Usual { largest, ..usual })
 }
 
 /// What the tracker saw of a body in a row.
@@ -102,7 +122,7 @@ impl Seen {
         }
     }
 
-    /// χ²: components of the error.
+    /// What is usual of such an error.
     fn limits(&self) -> &'static Limits {
         match self {
             Self::Pose(_) => &OF_POSES,
@@ -375,14 +395,15 @@ impl<'a> BodyError<'a> {
 
     /// The error in units of what is usual.
     fn ratio(&self, seen: &SeenRow<'_>, usual: Usual) -> Option<f64> {
-        Some(self.weighted(seen, seen.q, usual)?.norm() / seen.seen.limits().median)
+        let (shift, turn) = self.size(seen)?;
+        usual.ratio(turn, shift)
     }
 
     pub(super) fn far_off(&self, loaded: &'a Loaded, row: usize, usual: Usual) -> Option<FarOff> {
         let seen = self.seen(loaded, row)?;
         let (position, angle) = self.size(&seen)?;
         let ratio = self.ratio(&seen, usual)?;
-        if ratio < seen.seen.limits().far_off {
+        if ratio < seen.seen.limits().far_off.max(BEYOND * usual.largest) {
             return None;
         }
         let joint = self.one_joint(&seen, usual);

@@ -5,7 +5,7 @@ use calib_finding::{About, Fact, Finding, Severity, Unit, catalog};
 use calib_report::{Status, Unobservable};
 
 use crate::error::PipelineError;
-use crate::formulate::bad_rows::not_said;
+use crate::formulate::bad_rows::say;
 use crate::formulate::cameras::Outcome;
 use crate::formulate::checked::Checked;
 use crate::formulate::chosen::Chosen;
@@ -16,7 +16,7 @@ use crate::formulate::memory::with_memory;
 use crate::formulate::ml;
 use crate::formulate::realign::realign;
 use crate::formulate::solved::Solved;
-use crate::formulate::stuck::without_stuck;
+use crate::formulate::stuck::{is_stuck, without_stuck};
 use crate::formulate::{
     cameras, clock, gain_or_scale, gear_ratio, noise, priors, row_levels, starts, wanted,
 };
@@ -66,12 +66,11 @@ pub fn likelihood(
         progress("fit again with the clocks brought together");
         let again = fits(inputs, checked, &how, progress)?;
         (registered, fit) = (again.0, again.1);
-        // Rows that had not settled are out; others are judged again.
-        of_rows.retain(|f| f.id == catalog::UNSETTLED_ROWS);
+        // Rows that are out stay out; others are judged again.
+        of_rows.retain(is_of_rows_out);
         of_rows.extend(again.2);
     }
-    let of_rows = not_said(of_rows, &checked.findings);
-    checked.findings.extend(of_rows);
+    say(&mut checked.findings, of_rows);
     progress("choose the noise");
     // A prior that the robot contradicts looks like noise, and the noise decides what the data say of a prior.
     priors::by_evidence(&mut fit, inputs, &settings);
@@ -154,12 +153,20 @@ fn before_cameras(
     let outcome = cameras::outcome(with.as_ref().map(|w| &w.1), &equal.1, how.settings);
     checked.findings.extend(cameras::finding(inputs, outcome));
     match with.filter(|_| outcome == Outcome::Taken) {
-        Some(with) => Ok(with),
+        Some(mut with) => {
+            with.2.extend(equal.2.into_iter().filter(is_of_rows_out));
+            Ok(with)
+        }
         None => {
             (*inputs, checked.tracks) = before;
             Ok(equal)
         }
     }
+}
+
+/// Whether the rows that a finding names take no part in the fit, so that a further one says nothing of them.
+fn is_of_rows_out(finding: &Finding) -> bool {
+    finding.id == catalog::UNSETTLED_ROWS || is_stuck(finding)
 }
 
 /// How to fit.
@@ -193,7 +200,7 @@ fn fits(
     };
     let mut findings = Vec::new();
     if settings.robust.enabled {
-        let of_stuck = without_stuck(inputs, &mut checked.tracks, &checked.start, fit, &alone)?;
+        let of_stuck = without_stuck(inputs, &mut checked.tracks, &checked.start, fit, &alone);
         of_stuck.leave_out_explained(&mut checked.findings);
         let mut bad = of_stuck.bad;
         fit = of_stuck.fit;
@@ -210,14 +217,16 @@ fn fits(
         }
         findings = of_stuck.findings;
         findings.extend(bad.findings);
-        let unsettled = !bad.unsettled.is_empty();
+        let mut out = bad.unsettled;
+        out.extend(bad.stuck);
+        let unsettled = !out.is_empty();
         // What the model lacks is no gross error of the rows that show it.
         let explained = complete.and_then(|c| fit.solution.with_kept_of(&c.solution, &alone));
         if let Some(solution) = explained.filter(|_| !unsettled) {
             fit = ml::found(fit.formulation, inputs, solution);
         } else if unsettled || fit.solution.would_keep_more(settings) {
             progress("fit again with the rows that count");
-            inputs.exclude(bad.unsettled);
+            inputs.exclude(out);
             checked.tracks = body_tracks(inputs, &mut Vec::new())?;
             let full = ml::state(inputs, &checked.tracks, &checked.start, FreeSet::Profile);
             fit = ml::fit(full, inputs, settings)?;

@@ -221,15 +221,17 @@ pub fn noticed(findings: &mut Vec<Finding>, inputs: &Inputs, fit: &MlFit) {
                 f.id == catalog::CLOCK_LAG && f.subject.recordings.contains(&loaded.name)
             });
             for finding in own {
-                *finding = finding
+                let mut own = finding
                     .clone()
                     .with("offset", Fact::seconds(clock.offset))
-                    .with("sigma", Fact::seconds(sigma))
-                    .with("drift", Fact::ratio(clock.drift))
-                    .with(
-                        "sigma_drift",
-                        Fact::ratio(clock.drift_sigma.unwrap_or_default()),
-                    );
+                    .with("sigma", Fact::seconds(sigma));
+                // A rate that the fit does not tell stays as it was found before.
+                if let Some(sigma) = clock.drift_sigma {
+                    own = own
+                        .with("drift", Fact::ratio(clock.drift))
+                        .with("sigma_drift", Fact::ratio(sigma));
+                }
+                *finding = own;
             }
         } else if alignment.unknowns() == ClockUnknowns::Offset
             && clock.offset.abs() > SAME_TIME.max(4.0 * sigma)

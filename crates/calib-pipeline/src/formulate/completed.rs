@@ -209,5 +209,10 @@ fn renamed(bad: &mut BadRows, name: &str) {
         if finding.subject.about == of_part.about {
             finding.subject.about = own.about.clone();
         }
+        for key in ["first", "second", "body"] {
+            if finding.facts.get(key).and_then(Fact::word) == Some(&part) {
+                finding.facts.insert(key, Fact::name(name));
+            }
+        }
     }
 }

@@ -35,7 +35,14 @@ pub(super) fn put_right(
         let mut findings = of.findings.iter();
         findings.any(|f| f.id == catalog::MODEL_DISAGREES)
     };
-    if !disagrees(found) {
+    let names = inputs.recordings.keys();
+    let seen = |name: &String| {
+        let bodies = tracks.values();
+        bodies
+            .filter(|track| !track.in_recording(name).is_empty())
+            .count()
+    };
+    if !disagrees(found) || names.map(seen).all(|bodies| bodies < 2) {
         return None;
     }
     let unexplained = Structural {

@@ -85,6 +85,9 @@ pub fn rows(
     let of_names = exchanged(&mut all);
     let of_names = of_names.iter().map(|of| of.finding(inputs));
     let mut findings: Vec<Finding> = of_names.collect();
+    all.par_iter_mut().for_each(|of| {
+        of.moving = of.on_the_way(inputs, structural);
+    });
     let mut all = deviating(inputs, tracks, structural, &all);
     findings.extend(in_several_bodies(inputs, &mut all));
     for rows in &all {
@@ -125,19 +128,12 @@ fn spoilt<'a>(
         };
         let poses: Vec<_> = q.iter().map(|q| at(q)).collect();
         let spoiled = spoiled_rows(seen, &poses);
-        let on_the_way = |row: &&SpoiledRow| {
-            on_the_way(&q, row, |there| {
-                spoiled.disagreement_at(row.row, &at(there), seen, &poses)
-            })
-        };
-        let moving = spoiled.rows.iter().filter(on_the_way).map(|row| row.row);
-        let moving: BTreeSet<usize> = moving.collect();
         (!spoiled.rows.is_empty()).then_some(Spoilt {
             body,
             loaded,
             seen,
             poses,
-            moving,
+            moving: BTreeSet::new(),
             spoiled,
         })
     };
@@ -215,7 +211,7 @@ struct Spoilt<'a> {
     seen: &'a [Option<Isometry3<f64>>],
     /// `base_from_link` per row.
     poses: Vec<Isometry3<f64>>,
-    /// Those that are right on the way to a neighboring row.
+    /// Those that are right on the way to a neighboring row, once they were asked.
     moving: BTreeSet<usize>,
     spoiled: Spoiled,
 }
@@ -229,7 +225,7 @@ pub(super) struct Exchanged<'a> {
 }
 
 impl Exchanged<'_> {
-    /// An error where so many rows are wrong that no robust fit leaves them all out.
+    /// An error where so many rows are wrong that one cannot rely on a robust fit to leave them all out.
     pub(super) fn finding(&self, inputs: &Inputs) -> Finding {
         let few = self.rows.len() as f64 <= FEW * self.loaded.poses.len() as f64;
         let kind = match few && inputs.robot.profile.solve.robust {
@@ -283,6 +279,22 @@ fn exchanged<'a>(all: &mut [Spoilt<'a>]) -> Vec<Exchanged<'a>> {
 }
 
 impl Spoilt<'_> {
+    /// Rows that are right somewhere on the way to a neighboring row.
+    fn on_the_way(&self, inputs: &Inputs, structural: &Structural) -> BTreeSet<usize> {
+        let link = inputs.robot.profile.bodies[self.body].link;
+        let q: Vec<&Vec<f64>> = self.loaded.q.iter().flatten().collect();
+        let is_on_the_way = |row: &&SpoiledRow| {
+            on_the_way(&q, row, |there| {
+                let q = corrected(there, structural);
+                let there = inputs.robot.model.root_from_link(&q, link);
+                let spoiled = &self.spoiled;
+                spoiled.disagreement_at(row.row, &there, self.seen, &self.poses)
+            })
+        };
+        let rows = self.spoiled.rows.iter().filter(is_on_the_way);
+        rows.map(|row| row.row).collect()
+    }
+
     /// Rows in which both bodies disagree with the others, and neither does with the other's pose.
     fn exchanged_with<'s>(&'s self, other: &'s Self) -> impl Iterator<Item = usize> + 's {
         let agrees = |of: &Self, row: &SpoiledRow, instead: &Self| {
@@ -294,8 +306,9 @@ impl Spoilt<'_> {
             off.is_some_and(|off| off < LEFT * row.off)
         };
         let both = self.spoiled.rows.iter().filter_map(move |row| {
-            let of_other = other.spoiled.rows.iter().find(|r| r.row == row.row)?;
-            Some((row, of_other))
+            let others = &other.spoiled.rows;
+            let place = others.binary_search_by_key(&row.row, |r| r.row).ok()?;
+            Some((row, &others[place]))
         });
         both.filter(move |(row, of_other)| {
             agrees(self, row, other) && agrees(other, of_other, self)

@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 use std::ops::Range;
 
-use calib_finding::{Fact, Finding, Subject, catalog};
+use calib_finding::{Fact, Finding, Severity, Subject, catalog};
 use calib_urdf::{JointId, JointKind, RobotModel};
 
 use crate::prepare::inputs::Loaded;
@@ -15,6 +15,10 @@ use crate::prepare::inputs::Loaded;
 const APART: (f64, f64) = (0.0175, 2e-3);
 /// Places that a joint has moved to where it did not slip, or stand elsewhere, once.
 const PLACES: usize = 3;
+/// In sweeps of other joints a reading stands in some rows by itself, and backlash has two sides.
+const PLACES_IN_ROWS: usize = 4;
+/// Correlation with the reading of another joint from which on that joint moves this one.
+const FOLLOWS: f64 = 0.98;
 
 /// An error of one joint that explains a row best.
 #[derive(Clone, Copy)]
@@ -49,7 +53,10 @@ pub(super) fn standing(
         by_joint.entry(of.joint).or_default().push((*row, of.step));
     }
     let (joint, mut steps) = by_joint.into_iter().max_by_key(|(_, rows)| rows.len())?;
-    let within = |run: &Range<usize>| steps.iter().filter(|(row, _)| run.contains(row)).count();
+    let within = |run: &Range<usize>| {
+        let before = |end: usize| steps.partition_point(|(row, _)| *row < end);
+        before(run.end) - before(run.start)
+    };
     let run = runs(loaded, joint).into_iter().max_by_key(within)?;
     steps.retain(|(row, _)| run.contains(row));
     if 2 * steps.len() < explained.len() {
@@ -72,9 +79,12 @@ pub(super) fn standing(
         run,
         rows: steps.iter().map(|(row, _)| *row).collect(),
     };
-    // In sweeps of other joints a reading stands in some rows by itself.
-    let enough = steps.len() >= PLACES || !standing.is_in_rows(loaded);
-    (count >= PLACES && enough).then_some(standing)
+    let places = match standing.is_in_rows(loaded) {
+        true if standing.is_of_others(loaded, &steps) => return None,
+        true => PLACES_IN_ROWS,
+        false => PLACES,
+    };
+    (count >= places).then_some(standing)
 }
 
 /// Rows that follow each other with the same reading of a joint.
@@ -91,6 +101,21 @@ fn runs(loaded: &Loaded, joint: JointId) -> Vec<Range<usize>> {
 }
 
 impl Standing {
+    /// Whether something else explains rows within a recording: most of those between the first and the last are right, or the joint follows another one.
+    fn is_of_others(&self, loaded: &Loaded, steps: &[(usize, f64)]) -> bool {
+        let (Some(first), Some(last)) = (self.rows.first(), self.rows.last()) else {
+            return true;
+        };
+        let follows = |other: usize| {
+            let pairs = steps
+                .iter()
+                .filter_map(|(row, step)| Some((loaded.q[*row].as_ref()?[other], *step)));
+            correlation(&pairs.collect::<Vec<_>>()).abs() > FOLLOWS
+        };
+        let joints = loaded.q[self.run.start].as_ref().map_or(0, Vec::len);
+        2 * self.rows.len() <= last - first + 1 || (0..joints).any(follows)
+    }
+
     /// Whether the reading is another one in other rows.
     pub(super) fn is_in_rows(&self, loaded: &Loaded) -> bool {
         let mut others = loaded.q.iter().flatten();
@@ -108,7 +133,13 @@ impl Standing {
         };
         let rows = self.rows.iter();
         let subject = Subject::joint(&model.joint(self.joint).name).in_recording(&loaded.name);
+        // Most of a recording is no longer there.
+        let severity = match 2 * of > loaded.q.len() {
+            true => Severity::Error,
+            false => Severity::Warning,
+        };
         Finding::of_kind(catalog::JOINT_NEVER_MOVED, kind, subject)
+            .with_severity(severity)
             .with("at", size(self.at))
             .with("count", Fact::count(self.rows.len()))
             .with("of", Fact::count(of))
@@ -116,6 +147,22 @@ impl Standing {
             .with("moved", size(self.moved))
             .at_rows(rows.map(|row| loaded.poses.rows[*row]))
     }
+}
+
+/// Correlation coefficient; 0 where one of the two does not vary.
+fn correlation(pairs: &[(f64, f64)]) -> f64 {
+    let n = pairs.len() as f64;
+    let (x, y) = pairs
+        .iter()
+        .fold((0.0, 0.0), |(x, y), p| (x + p.0 / n, y + p.1 / n));
+    let mut sums = [0.0; 3];
+    for (a, b) in pairs.iter().map(|p| (p.0 - x, p.1 - y)) {
+        sums[0] += a * a;
+        sums[1] += b * b;
+        sums[2] += a * b;
+    }
+    let size = (sums[0] * sums[1]).sqrt();
+    if size > 0.0 { sums[2] / size } else { 0.0 }
 }
 
 fn turns(model: &RobotModel, joint: JointId) -> bool {

@@ -5,7 +5,8 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use calib_core::Settings;
-use calib_finding::{About, Finding, Severity, catalog};
+use calib_finding::{About, Fact, Finding, Severity, catalog};
+use calib_profile::Usage;
 
 use crate::error::PipelineError;
 use crate::estimate::start::Start;
@@ -28,21 +29,18 @@ pub(crate) struct WithoutStuck {
     pub(crate) findings: Vec<Finding>,
     /// The rows, as the recordings number them.
     rows: BTreeSet<(String, u64)>,
-    /// Joints that the bodies in them hang on.
+    /// Joints whose gains and couplings these rows look like.
     joints: BTreeSet<String>,
 }
 
-/// Takes the rows out of the recordings, and fits again, until there are none.
-///
-/// # Errors
-/// Those of the body tracks and of the fit.
+/// Takes the rows out of the recordings, and fits again, for some joints one after the other; where nothing can be fitted without them, they stay.
 pub(crate) fn without_stuck(
     inputs: &mut Inputs,
     tracks: &mut BTreeMap<String, BodyTrack>,
     start: &Start,
     fit: MlFit,
     settings: &Settings,
-) -> Result<WithoutStuck, PipelineError> {
+) -> WithoutStuck {
     let bad = bad_rows(inputs, tracks, &fit);
     let mut found = WithoutStuck {
         fit,
@@ -55,29 +53,80 @@ pub(crate) fn without_stuck(
         if found.bad.stuck.is_empty() {
             break;
         }
-        let said = found.bad.findings.into_iter();
-        let of_joints = said.filter(|f| f.id == catalog::JOINT_NEVER_MOVED);
-        found.findings.extend(of_joints);
-        for out in &found.bad.stuck {
-            let row = inputs.recordings[&out.recording].poses.rows[out.row];
-            found.rows.insert((out.recording.clone(), row));
-            let model = &inputs.robot.model;
-            let chain = model.chain_to_root(inputs.robot.profile.bodies[&out.body].link);
-            let names = chain
-                .into_iter()
-                .map(|joint| model.joint(joint).name.clone());
-            found.joints.extend(names);
+        let mut without = inputs.clone();
+        without.exclude(found.bad.stuck.clone());
+        let Ok((of_bodies, fit)) = fitted(&without, start, settings) else {
+            break;
+        };
+        let said = std::mem::take(&mut found.bad.findings);
+        for finding in said.into_iter().filter(is_stuck) {
+            found.of_joint(finding);
         }
-        inputs.exclude(found.bad.stuck);
-        *tracks = body_tracks(inputs, &mut Vec::new())?;
-        let full = ml::state(inputs, tracks, start, FreeSet::Profile);
-        found.fit = ml::fit(full, inputs, settings)?;
-        found.bad = bad_rows(inputs, tracks, &found.fit);
+        found.rows_of(inputs);
+        found.bad = bad_rows(&without, &of_bodies, &fit);
+        found.fit = fit;
+        (*inputs, *tracks) = (without, of_bodies);
     }
-    Ok(found)
+    found
+}
+
+fn fitted(
+    inputs: &Inputs,
+    start: &Start,
+    settings: &Settings,
+) -> Result<(BTreeMap<String, BodyTrack>, MlFit), PipelineError> {
+    let tracks = body_tracks(inputs, &mut Vec::new())?;
+    let full = ml::state(inputs, &tracks, start, FreeSet::Profile);
+    let fit = ml::fit(full, inputs, settings)?;
+    Ok((tracks, fit))
+}
+
+/// Whether a finding names rows in which the readings of a joint stand although it moved.
+pub(crate) fn is_stuck(finding: &Finding) -> bool {
+    let kind = finding.facts.get("kind").and_then(Fact::word);
+    finding.id == catalog::JOINT_NEVER_MOVED && kind == Some("although_in_rows")
 }
 
 impl WithoutStuck {
+    /// One finding for each joint and recording: that of the body which shows most.
+    fn of_joint(&mut self, finding: Finding) {
+        let same = |f: &&mut Finding| f.subject == finding.subject;
+        match self.findings.iter_mut().find(same) {
+            Some(earlier) if finding.rows.len() > earlier.rows.len() => *earlier = finding,
+            Some(_) => {}
+            None => {
+                if let About::Joint(name) = &finding.subject.about {
+                    self.joints.insert(name.clone());
+                }
+                self.findings.push(finding);
+            }
+        }
+    }
+
+    /// Remembers the rows; where they are a sizable part of what is fitted, they look like mistakes of all joints before the bodies.
+    fn rows_of(&mut self, inputs: &Inputs) {
+        /// Part of the fitted rows.
+        const SIZABLE: f64 = 0.1;
+        for out in &self.bad.stuck {
+            let row = inputs.recordings[&out.recording].poses.rows[out.row];
+            self.rows.insert((out.recording.clone(), row));
+        }
+        let recordings = inputs.recordings.values();
+        let fitted = recordings.filter(|r| r.spec.usage != Usage::Validation);
+        let all: usize = fitted.map(|r| r.poses.len()).sum();
+        if self.rows.len() as f64 <= SIZABLE * all as f64 {
+            return;
+        }
+        let model = &inputs.robot.model;
+        let bodies: BTreeSet<&String> = self.bad.stuck.iter().map(|out| &out.body).collect();
+        let links = bodies
+            .iter()
+            .map(|body| inputs.robot.profile.bodies[*body].link);
+        let joints = links.flat_map(|link| model.chain_to_root(link));
+        self.joints
+            .extend(joints.map(|joint| model.joint(joint).name.clone()));
+    }
+
     /// Leaves out of `findings` what these rows looked like to the nominal robot: gains and couplings of the joints, and single rows that are wrong.
     pub(crate) fn leave_out_explained(&self, findings: &mut Vec<Finding>) {
         let of_rows = [
