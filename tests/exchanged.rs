@@ -71,6 +71,8 @@ enum Design {
     Random,
     /// One joint after the other, eight rows each.
     Sweeps,
+    /// Many random rows, of which no single one weighs.
+    Many,
 }
 
 /// What the tracker writes.
@@ -104,6 +106,7 @@ fn motions(joints: &[Joint], design: Design, rng: &mut ChaCha8Rng) -> Vec<Vec<f6
     };
     match design {
         Design::Random => (0..40).map(|_| random()).collect(),
+        Design::Many => (0..500).map(|_| random()).collect(),
         Design::Sweeps => {
             let home = random();
             let row = |row: usize| {
@@ -381,6 +384,7 @@ fn bodies_of_which_only_poses_are_known_are_named_in_scattered_rows() {
         (ARM, Design::Random, 1),
         (ARM, Design::Sweeps, 2),
         (MOBILE, Design::Random, 3),
+        (ARM, Design::Many, 4),
     ] {
         let often = |row: usize| row < CHECKS && row % 10 % 4 == 1;
         let of_row = |row| match often(row) {
@@ -401,7 +405,11 @@ fn bodies_of_which_only_poses_are_known_are_named_in_scattered_rows() {
         };
         assert_eq!(only["id"], "row-outlier", "{only}");
         assert_eq!(only["facts"]["kind"], "exchanged");
-        let rows = if design == Design::Sweeps { 48 } else { 40 };
+        let rows = match design {
+            Design::Random => 40,
+            Design::Sweeps => 48,
+            Design::Many => 500,
+        };
         let rows: Vec<usize> = (0..rows).filter(|r| often(*r)).map(|r| r + 2).collect();
         assert_eq!(only["rows"], serde_json::json!(rows), "{seed}");
     }

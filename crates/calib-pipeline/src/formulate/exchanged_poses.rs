@@ -5,7 +5,7 @@
 
 use std::collections::BTreeMap;
 
-use calib_finding::{Finding, catalog};
+use calib_finding::{Finding, Severity, catalog};
 use calib_profile::BodyKind;
 
 use crate::formulate::row_checks::{Exchanged, exchanged_rows};
@@ -25,16 +25,18 @@ pub(super) struct PutRight {
     pub(super) structural: Structural,
 }
 
-/// The explanation by exchanged names, where nothing else explains what `found` says.
+/// The explanation by exchanged names, where nothing else explains all of what is wrong.
 pub(super) fn put_right(
     inputs: &Inputs,
     tracks: &BTreeMap<String, BodyTrack>,
     found: &Structural,
 ) -> Option<PutRight> {
-    let disagrees = |of: &Structural| {
-        let mut findings = of.findings.iter();
-        findings.any(|f| f.id == catalog::MODEL_DISAGREES)
+    // A name that leaves more than nominal errors explain is no explanation of all.
+    let is_open = |f: &Finding| {
+        let leaves_more = f.facts.get("best").is_some() && f.facts.get("limit").is_some();
+        f.id == catalog::MODEL_DISAGREES || f.severity == Severity::Error && leaves_more
     };
+    let disagrees = |of: &Structural| of.findings.iter().any(is_open);
     let names = inputs.recordings.keys();
     let seen = |name: &String| {
         let bodies = tracks.values();
