@@ -1,6 +1,6 @@
 //! Rows that the robust fit left out, and what is wrong with them.
 //!
-//! If a fraction of the way to another row makes a row right ([`mod@crate::formulate::body_error`]), joints and tracker were read at different times, or the
+//! If a fraction of the way to another row makes a row right (`body_error`), joints and tracker were read at different times, or the
 //! robot had not settled. Where an error of one joint alone leaves clearly less, its reading was wrong. Where each of two bodies is where the other should
 //! be, the tracker exchanged their names.
 
