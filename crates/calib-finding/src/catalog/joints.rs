@@ -109,7 +109,7 @@ super::topic! {
             "All readings of the joint are {at}, but in {count} of {of:row} body `{body}` is where it would be if the joint had moved, over {moved} in all.",
             "Look for why the readings of this joint do not change: another column was exported, or its encoder is not read. Record again.";
         "although_in_rows": Warning,
-            "In {of:row} in succession all readings of the joint are {at}, but in {count} of them body `{body}` is where it would be if the joint had moved, over {moved} in all. These rows take no part in the fit.",
+            "In {of:row} in succession all readings of the joint are {at}, but in {count} of them body `{body}` is where it would be if the joint had moved, over {moved} in all.[[ These {left_out:row} take no part in the fit.]]",
             "Look for why the readings of this joint stopped changing, and record these rows again.";
     }
     /// Rows without a reading of a joint.

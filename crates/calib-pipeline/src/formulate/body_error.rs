@@ -68,7 +68,10 @@ impl Usual {
     fn ratio(&self, turn: Option<f64>, shift: f64) -> Option<f64> {
         let shift = shift / self.shift;
         Some(match turn {
-            Some(turn) => shift.hypot(turn / self.turn?) / OF_POSES.median,
+            Some(turn) => {
+                let turn = turn / self.turn?;
+                (shift * shift + turn * turn).sqrt() / OF_POSES.median
+            }
             None => shift / OF_MARKERS.median,
         })
     }

@@ -56,11 +56,13 @@ pub(crate) fn without_stuck(
         let mut without = inputs.clone();
         without.exclude(found.bad.stuck.clone());
         let Ok((of_bodies, fit)) = fitted(&without, start, settings) else {
+            found.bad.stuck.clear();
             break;
         };
         let said = std::mem::take(&mut found.bad.findings);
         for finding in said.into_iter().filter(is_stuck) {
-            found.of_joint(finding);
+            let rows = finding.facts.get("of").cloned();
+            found.of_joint(finding.with_some("left_out", rows));
         }
         found.rows_of(inputs);
         found.bad = bad_rows(&without, &of_bodies, &fit);

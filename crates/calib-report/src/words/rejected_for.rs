@@ -14,7 +14,9 @@ impl RejectedFor {
             Self::HeldReadings => {
                 "the joint readings repeat those of an earlier row, and the body had moved"
             }
-            Self::StuckReading => "the readings of a joint stand still, and the joint had moved",
+            Self::StuckReading => {
+                "the readings of a joint did not change, although the joint had moved"
+            }
             Self::NotSettled => {
                 "not settled: the whole body is displaced, or a joint reading is wrong"
             }
