@@ -39,6 +39,7 @@ mod loads;
 mod many_markers;
 mod mimics;
 mod month;
+mod notations;
 mod occluded;
 mod outputs;
 mod pan_tilt;

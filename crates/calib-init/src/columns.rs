@@ -6,32 +6,19 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use calib_recording::{AngleUnit, BodyColumns, ColumnMap, LengthUnit, TimeColumn, TimeUnit};
+use calib_recording::{AngleUnit, LengthUnit, TimeColumn, TimeUnit};
 use calib_urdf::{JointId, JointKind, RobotModel};
 
 use crate::fact::{About, AngleHow, LengthHow};
+use crate::guess::{Guess, TURN};
 use crate::header::Header;
 use crate::name::{self, NamedUnit};
 use crate::robot;
+use crate::tracked;
 use crate::unread;
 
-/// Largest angle in radians that is no angle in degrees: one turn, and a tenth.
-const TURN: f64 = 2.2 * std::f64::consts::PI;
 /// Markers spread over so many times the robot's reach are not in meters.
 const FAR: f64 = 20.0;
-
-/// A column map with what it was made from.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct Guess {
-    /// The map.
-    pub map: ColumnMap,
-    /// What was found, and how.
-    pub facts: Vec<About>,
-    /// Joint and its column.
-    pub joints: Vec<(JointId, String)>,
-    /// Joints and columns are paired by their order alone.
-    pub by_order: bool,
-}
 
 /// The map of a table.
 #[must_use]
@@ -43,13 +30,14 @@ pub fn guess(model: &RobotModel, header: &Header) -> Guess {
     let (stated, named) = like_coordinates(model, header);
     // The columns `x`, `y` and `z` are a marker where the table has no other.
     let both: BTreeSet<usize> = stated.union(&named).copied().collect();
-    tracked(header, &mut guess, &mut used, &both);
+    tracked::tracked(header, &mut guess, &mut used, &both);
     if guess.map.markers.is_empty() && guess.map.bodies.is_empty() {
-        tracked(header, &mut guess, &mut used, &stated);
+        tracked::tracked(header, &mut guess, &mut used, &stated);
     }
     joints(model, header, &mut guess, &mut used);
     angles(model, header, &mut guess);
     lengths(model, header, &mut guess);
+    tracked::unit_of_turns(header, &mut guess);
     let ignored =
         (0..header.names.len()).filter(|i| !used.contains(i) && !header.names[*i].is_empty());
     let ignored: Vec<String> = ignored.map(|i| header.names[i].clone()).collect();
@@ -137,9 +125,6 @@ fn unit_of_time(column: &[Option<f64>]) -> TimeUnit {
     }
 }
 
-/// Columns of one thing: what stands around the letter → the columns by letter.
-type Groups = BTreeMap<(String, String), [Option<usize>; 4]>;
-
 /// What stands before the name of a joint that would read as something else.
 const JOINT: &str = "joint:";
 
@@ -158,63 +143,6 @@ fn like_coordinates(model: &RobotModel, header: &Header) -> (BTreeSet<usize>, BT
     };
     let all = (0..header.names.len()).filter(of_joint);
     all.partition(|i| header.names[*i].starts_with(JOINT))
-}
-
-/// Columns in threes (x, y, z) and in fours (a quaternion), but for those of joints.
-fn tracked(
-    header: &Header,
-    guess: &mut Guess,
-    used: &mut BTreeSet<usize>,
-    joints: &BTreeSet<usize>,
-) {
-    let (mut places, mut turns) = (Groups::new(), Groups::new());
-    let free = |i: &usize| !used.contains(i) && !joints.contains(i) && header.has_numbers(*i);
-    for i in (0..header.names.len()).filter(free) {
-        let unit = header.unit(i);
-        if !matches!(unit.unit, None | Some(NamedUnit::Length(_))) {
-            continue;
-        }
-        for (k, letter) in ['x', 'y', 'z', 'w'].into_iter().enumerate() {
-            if let Some((before, behind)) = name::quaternion(unit.stem, letter) {
-                let group = turns.entry((before.to_owned(), behind.to_owned()));
-                group.or_default()[k].get_or_insert(i);
-            } else if k < 3
-                && let Some((before, behind)) = name::coordinate(unit.stem, letter)
-                && !name::is_no_position(unit.stem)
-            {
-                let group = places.entry((before.to_owned(), behind.to_owned()));
-                group.or_default()[k].get_or_insert(i);
-            }
-        }
-    }
-    let names = |columns: &[usize]| -> Vec<String> {
-        columns.iter().map(|i| header.names[*i].clone()).collect()
-    };
-    let mut named: BTreeMap<String, [usize; 3]> = BTreeMap::new();
-    for ((before, behind), columns) in &places {
-        if let [Some(x), Some(y), Some(z), _] = *columns {
-            named.insert(name::of_rest(before, behind, 'm'), [x, y, z]);
-        }
-    }
-    for ((before, behind), columns) in &turns {
-        let name = name::of_rest(before, behind, 'm');
-        if let [Some(x), Some(y), Some(z), Some(w)] = *columns
-            && let Some(position) = named.remove(&name)
-        {
-            used.extend(position.iter().chain(&[x, y, z, w]));
-            let body = BodyColumns {
-                position: names(&position).try_into().unwrap_or_default(),
-                quaternion_xyzw: names(&[x, y, z, w]).try_into().ok(),
-                ..BodyColumns::default()
-            };
-            guess.map.bodies.insert(name, body);
-        }
-    }
-    for (name, position) in named {
-        used.extend(position);
-        let position = names(&position).try_into().unwrap_or_default();
-        guess.map.markers.insert(name, position);
-    }
 }
 
 /// Columns of joints.

@@ -4,7 +4,7 @@ use calib_checks::structural::Chain;
 use calib_recording::Poses;
 
 use crate::bodies::Found;
-use crate::fact::{About, Fact, Place};
+use crate::fact::{About, Fact, Notation, Place};
 use crate::links::Scene;
 use crate::source::Source;
 
@@ -30,16 +30,28 @@ pub fn computed(
     fixed: usize,
     noise: Option<f64>,
 ) -> Vec<(usize, Fact)> {
-    let columns = |markers: &[String]| -> Vec<String> {
+    let columns = |body: &Found| -> Vec<String> {
         let maps = || sources.iter().filter_map(|source| source.columns.as_ref());
         let of = |marker: &String| maps().find_map(|map| map.markers.get(marker));
-        markers.iter().filter_map(of).flatten().cloned().collect()
+        let of_markers = body.markers.iter().filter_map(of).flatten().cloned();
+        let pose = maps().find_map(|map| map.bodies.get(&body.name));
+        let pose = pose.filter(|_| body.markers.is_empty()).map(|pose| {
+            let turns = Notation::of(pose).map_or_else(Vec::new, |(_, columns)| columns);
+            [pose.position.to_vec(), turns].concat()
+        });
+        of_markers.chain(pose.into_iter().flatten()).collect()
+    };
+    // Controllers write angles, and round; a tracker that computes a pose from many markers mostly writes a quaternion.
+    let is_quaternion = |body: &Found| {
+        let maps = sources.iter().filter_map(|source| source.columns.as_ref());
+        let poses = maps.filter_map(|map| map.bodies.get(&body.name));
+        let mut notations = poses.filter_map(Notation::of).map(|(notation, _)| notation);
+        notations.all(|notation| matches!(notation, Notation::Quaternion { .. }))
     };
     let limit = |of: &Found| {
-        let part = if of.markers.is_empty() {
-            BELOW
-        } else {
-            OF_NOISE
+        let part = match of.markers.is_empty() && is_quaternion(of) {
+            true => BELOW,
+            false => OF_NOISE,
         };
         noise.map_or(RESOLVED, |noise| COMPUTED.min(part * noise))
     };
@@ -74,7 +86,7 @@ pub fn computed(
         let (other, next) = others.max_by(|a, b| a.1.total_cmp(&b.1))?;
         let about = About::Computed {
             body: one.name.clone(),
-            columns: columns(&one.markers),
+            columns: columns(one),
             markers: one.markers.clone(),
             rms: [own, next],
             other: scene.bodies[other].name.clone(),

@@ -3,7 +3,7 @@
 use calib_checks::structural::{
     BodyIndex, Chain, ColumnOrder, Hypothesis, Length, PoseMistake, Scoped, UnitMistake,
 };
-use calib_recording::{AngleUnit, ColumnMap, LengthUnit};
+use calib_recording::{AngleUnit, BodyColumns, ColumnMap, LengthUnit};
 use calib_urdf::{JointKind, RobotModel, doubt};
 
 use crate::error::InitError;
@@ -69,7 +69,8 @@ pub fn mistake(
         Hypothesis::Poses { mistake, .. } => match mistake {
             PoseMistake::ScalarFirstReadAsLast => Mistake::Quaternions { first: true },
             PoseMistake::ScalarLastReadAsFirst => Mistake::Quaternions { first: false },
-            _ => Mistake::Poses,
+            PoseMistake::Inverse => Mistake::Inverted,
+            PoseMistake::Transposed => Mistake::Poses,
         },
         Hypothesis::MissingColumn { joint: j } => Mistake::MissingColumn { joint: joint(j) },
         Hypothesis::StoodAt { joint: j, value } => Mistake::StoodAt {
@@ -369,7 +370,7 @@ fn rename(map: &mut ColumnMap, table: &Header, new: impl Fn(&String) -> String) 
         .extend(moved.into_iter().map(|name| (name.clone(), name)));
     let joints = map.joints.values_mut().chain(map.prismatic.values_mut());
     let markers = map.markers.values_mut().flatten();
-    let bodies = map.bodies.values_mut().flat_map(|b| &mut b.position);
+    let bodies = map.bodies.values_mut().flat_map(BodyColumns::all_mut);
     let time = map.time.iter_mut().map(|time| &mut time.column);
     for column in joints.chain(markers).chain(bodies).chain(time) {
         *column = new(column);

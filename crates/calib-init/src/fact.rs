@@ -1,11 +1,16 @@
 //! What was found, as data. [`words`](crate::words) makes the sentences.
 
 mod guess;
+mod how;
+mod turns;
 
 use calib_recording::{AngleUnit, LengthUnit, TimeUnit};
 use serde::Serialize;
 
 use crate::mistake::Mistake;
+
+pub use how::{AngleHow, LengthHow};
+pub use turns::{Notation, TurnsHow};
 
 /// What a fact is about: a part of the profile.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
@@ -25,34 +30,6 @@ pub enum Place {
     Limits,
     /// The simulated recordings.
     Simulate,
-}
-
-/// How the unit of angles was found.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum AngleHow {
-    /// The names of the columns say it.
-    Named,
-    /// The largest number.
-    Range {
-        /// In the unit of the file.
-        largest: f64,
-    },
-}
-
-/// How the unit of lengths was found.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum LengthHow {
-    /// The names of the columns say it.
-    Named,
-    /// The extent of what was tracked against the reach of the robot.
-    Range {
-        /// In the unit of the file.
-        extent: f64,
-        /// m.
-        reach: f64,
-    },
 }
 
 /// Residuals of the registration of all recordings to the nominal robot, rms, m.
@@ -209,6 +186,17 @@ pub enum About {
         unit: TimeUnit,
         /// The name says the unit.
         named: bool,
+    },
+    /// The orientation of tracked bodies.
+    Turns {
+        /// Their columns.
+        columns: Vec<String>,
+        /// What they are read as.
+        notation: Notation,
+        /// The unit of angles; `None` for quaternions.
+        unit: Option<AngleUnit>,
+        /// How that was found.
+        how: TurnsHow,
     },
     /// Columns that nothing uses.
     Ignored {

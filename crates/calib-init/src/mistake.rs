@@ -70,6 +70,8 @@ pub enum Mistake {
         /// The scalar is the first of the four; else the last.
         first: bool,
     },
+    /// The poses are those of the tracker in the body.
+    Inverted,
     /// Another convention of poses was misread.
     Poses,
     /// A joint moved, and no column holds its readings.

@@ -97,27 +97,33 @@ fn word_of_unit(word: &str) -> Option<NamedUnit> {
     })
 }
 
-/// The words of a name in lower case: runs of letters, runs of digits; `handX` is `hand` and `x`.
+/// Where the words of a name stand: runs of letters, runs of digits; `handX` is `hand` and `X`.
 #[must_use]
-pub fn words(name: &str) -> Vec<String> {
-    let mut words: Vec<String> = Vec::new();
+pub fn spans(name: &str) -> Vec<std::ops::Range<usize>> {
+    let mut spans: Vec<std::ops::Range<usize>> = Vec::new();
     let mut last = ' ';
-    for c in name.chars() {
+    for (at, c) in name.char_indices() {
         if c.is_alphanumeric() {
             let same = (last.is_alphabetic()
                 && c.is_alphabetic()
                 && !(last.is_lowercase() && c.is_uppercase()))
                 || (last.is_numeric() && c.is_numeric());
-            if !same {
-                words.push(String::new());
-            }
-            if let Some(word) = words.last_mut() {
-                word.extend(c.to_lowercase());
+            let end = at + c.len_utf8();
+            match spans.last_mut().filter(|_| same) {
+                Some(span) => span.end = end,
+                None => spans.push(at..end),
             }
         }
         last = c;
     }
-    words
+    spans
+}
+
+/// The words of a name in lower case.
+#[must_use]
+pub fn words(name: &str) -> Vec<String> {
+    let spans = spans(name).into_iter();
+    spans.map(|span| name[span].to_lowercase()).collect()
 }
 
 /// Words of a column with the parts of a second that another column has whole.
@@ -254,6 +260,14 @@ const OTHERS: [&str; 28] = [
 #[must_use]
 pub fn is_no_position(name: &str) -> bool {
     words(name).iter().any(|w| OTHERS.contains(&w.as_str()))
+}
+
+/// Whether a column's name says that it holds something else than a place of what was tracked: as [`is_no_position`], but the pose of a
+/// camera's target is one.
+#[must_use]
+pub fn is_no_place(name: &str) -> bool {
+    let others = |w: &String| OTHERS.contains(&w.as_str()) && w != "pose" && w != "target";
+    words(name).iter().any(others)
 }
 
 /// `(what stands before, the number, what stands behind)` for the last number of a name.

@@ -1,6 +1,6 @@
 //! From a URDF and files to a proposal.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeSet;
 
 use calib_recording::{LengthUnit, Poses};
 use calib_urdf::{JointId, LinkId, RobotModel, doubt};
@@ -18,10 +18,11 @@ use crate::limits;
 use crate::links::Scene;
 use crate::proposal::{Body, Noise, Proposal, Recording, Table};
 use crate::robot;
-use crate::session::{self, Draft, Use};
-use crate::skeleton;
+use crate::session::{self, Draft};
 use crate::source::{File, Source};
 use crate::tables;
+use crate::turns;
+use crate::unrecorded;
 
 /// What the caller knows.
 #[derive(Debug, Clone, Default)]
@@ -97,7 +98,8 @@ pub fn propose(
                 .push(Fact::new(place, About::NoNewBody { link }));
         }
     } else if files.is_empty() {
-        without_recordings(model, request, stated, longest, &mut proposal)?;
+        let names = (request.folder.as_str(), request.urdf_shown.as_str());
+        unrecorded::propose(model, names, stated, longest, &mut proposal)?;
     } else {
         with_recordings(model, files, (stated, None), longest, &mut proposal)?;
     }
@@ -157,92 +159,9 @@ fn link_of(model: &RobotModel, name: &str) -> Result<LinkId, InitError> {
             },
             Err(_) => InitError::NoSuchLink {
                 unknown,
-                tips: ends(model),
+                tips: robot::ends(model),
             },
         })
-}
-
-/// Names of the ends of all chains.
-fn ends(model: &RobotModel) -> Vec<String> {
-    let tips = robot::tips(model).into_iter();
-    tips.map(|tip| model.link(tip.link).name.clone()).collect()
-}
-
-/// A body at the end of the longest chain, and postures to record.
-fn without_recordings(
-    model: &RobotModel,
-    request: &Request,
-    stated: Option<LinkId>,
-    longest: &robot::Tip,
-    proposal: &mut Proposal,
-) -> Result<(), InitError> {
-    let body = bodies::unlike_links(model, "tool".to_owned());
-    let link = stated.unwrap_or(longest.link);
-    let named = |link: LinkId| model.link(link).name.clone();
-    let about = match stated {
-        Some(link) => About::LinkStated {
-            link: named(link),
-            rms: None,
-            better: None,
-        },
-        None => About::TipOfChain {
-            link: named(link),
-            joints: longest.joints.len(),
-            others: robot::tips(model)
-                .iter()
-                .skip(1)
-                .map(|tip| named(tip.link))
-                .collect(),
-        },
-    };
-    proposal
-        .facts
-        .push(Fact::new(Place::Body(body.clone()), about));
-    let joints = robot::movers(model, link);
-    if joints.is_empty() {
-        return Err(InitError::StillLink {
-            link: named(link),
-            tips: ends(model),
-        });
-    }
-    let skeleton = skeleton::skeleton(model, &joints);
-    if skeleton.random.is_empty() {
-        let joints = robot::names(model, &joints).into_iter();
-        return Err(InitError::NoRange {
-            file: request.urdf_shown.clone(),
-            joints: joints.map(str::to_owned).collect(),
-        });
-    }
-    proposal.bodies.push(Body {
-        markers: (1..=4).map(|i| format!("{body}_{i}")).collect(),
-        name: body,
-        link,
-    });
-    // A robot that only slides has no axis to sweep.
-    let sweep = (!skeleton.sweep.is_empty()).then(|| ("sweep", Use::Sweep(skeleton.sweep.clone())));
-    let poses = [("poses", Use::Static), ("checks", Use::Validation)];
-    for (name, usage) in sweep.into_iter().chain(poses) {
-        proposal.recordings.push(Recording {
-            name: name.to_owned(),
-            table: Table {
-                path: format!("{}/{name}.csv", request.folder),
-                columns: None,
-            },
-            log: None,
-            stream: None,
-            max_offset: None,
-            usage,
-            hold: Vec::new(),
-        });
-    }
-    proposal.skeleton = Some(skeleton);
-    proposal
-        .facts
-        .push(Fact::new(Place::Tracker, About::SigmaUnknown));
-    proposal
-        .facts
-        .push(Fact::new(Place::Simulate, About::Invented));
-    Ok(())
 }
 
 /// All files, each once.
@@ -275,31 +194,27 @@ fn with_recordings(
     let mut sources = read(model, files, known)?;
     let (mut drafts, mut of_files) = session::drafts(model, &sources, &others)?;
     let (mut found, mut of_bodies, mut fixed) = all_bodies(model, &sources, known);
+    let files = shown(&sources);
     if found.is_empty() {
-        return Err(InitError::NothingSeen {
-            files: sources.iter().map(|s| s.file.shown.clone()).collect(),
-        });
+        return Err(InitError::NothingSeen { files });
     }
     bodies::without_left_out(model, &mut sources, &of_bodies)?;
     let start = stated.unwrap_or_else(|| last_recorded(model, &sources).unwrap_or(longest.link));
     proposal.bodies = on_link(&found, start, &fixed);
     proposal.recordings = recordings(&drafts, &sources);
     of_files.extend(tables::far_clocks(model, proposal, &mut drafts, &sources)?);
-    proposal.recordings = recordings(&drafts, &sources);
-    let mut poses = tables::tables(model, proposal, &drafts, &sources, &found)?;
-    let asks = stated.is_none() && fixed.len() < found.len();
-    if asks && poses.iter().all(|p| session::moved(model, p).is_empty()) {
-        return Err(InitError::NoMotion {
-            files: sources.iter().map(|s| s.file.shown.clone()).collect(),
-            tip: model.link(longest.link).name.clone(),
-        });
+    let mut poses = tables(model, proposal, &drafts, &sources, &found)?;
+    if stated.is_none() && fixed.len() < found.len() {
+        something_moves(model, &poses, &sources, longest)?;
+    }
+    let mut again = |read: &[Source]| tables(model, proposal, &drafts, read, &found);
+    let mut turns = turns::by_motion(model, &sources, &found, &poses, &mut again)?;
+    if let Some(read) = turns.sources.take() {
+        sources = read;
+        poses = again(&sources)?;
     }
     let mut corrections = Vec::new();
-    let scene = Scene {
-        model,
-        bodies: &found,
-        tables: &poses,
-    };
+    let scene = Scene::new(model, &found, &poses);
     let lengths = of_lengths(&drafts, &sources);
     if let Some((scoped, residuals)) = lengths.and_then(|unit| scene.tracker_unit(unit)) {
         let (fact, new) = apply_one(model, &sources, &drafts, &[], &scoped, (residuals, &[]))?;
@@ -307,8 +222,7 @@ fn with_recordings(
         if let Some(new) = new {
             sources = new;
             (found, of_bodies, fixed) = all_bodies(model, &sources, known);
-            proposal.recordings = recordings(&drafts, &sources);
-            poses = tables::tables(model, proposal, &drafts, &sources, &found)?;
+            poses = tables(model, proposal, &drafts, &sources, &found)?;
         }
     }
     let seen = (sources.as_mut_slice(), poses.as_slice());
@@ -317,16 +231,11 @@ fn with_recordings(
     let fewer = rigid_and_measured(model, &names, seen, &mut found, facts, &fixed)?;
     proposal.bodies = on_link(&found, start, &fixed);
     if fewer {
-        proposal.recordings = recordings(&drafts, &sources);
-        poses = tables::tables(model, proposal, &drafts, &sources, &found)?;
+        poses = tables(model, proposal, &drafts, &sources, &found)?;
     }
     let mut of_links = Vec::new();
     for _ in 0..=CORRECTIONS {
-        let scene = Scene {
-            model,
-            bodies: &found,
-            tables: &poses,
-        };
+        let scene = Scene::new(model, &found, &poses);
         let asked = ask(&scene, stated, &fixed);
         for (body, link) in &asked.assigned.on {
             proposal.bodies[*body].link = *link;
@@ -338,16 +247,14 @@ fn with_recordings(
             break;
         };
         sources = new;
-        proposal.recordings = recordings(&drafts, &sources);
-        poses = tables::tables(model, proposal, &drafts, &sources, &found)?;
+        poses = tables(model, proposal, &drafts, &sources, &found)?;
     }
     corrected::without_guesses(&mut of_files, &mut corrections);
     without_a_word(model, &proposal.bodies, &fixed, &mut of_links);
     let mut of_uses = session::uses(model, &mut drafts, &poses, &others);
     proposal.recordings = recordings(&drafts, &sources);
-    let nothing = BTreeMap::new();
-    let held = known.map_or(&nothing, Known::held);
-    let missing = hold::missing(model, proposal, &poses, held);
+    let held = known.map(|known| known.held().clone()).unwrap_or_default();
+    let missing = hold::missing(model, proposal, &poses, &held);
     if corrections.iter().any(corrected::is_correction) {
         corrected::noise(&mut of_bodies, bodies::bodies(model, &sources, &names).1);
     }
@@ -356,10 +263,52 @@ fn with_recordings(
         of_bodies = known.of_noise(of_bodies);
         of_uses = known.of_uses(model, (&drafts, &poses), of_uses);
     }
-    proposal
-        .facts
-        .extend([of_files, of_uses, of_bodies, of_links, missing, corrections].concat());
+    proposal.facts.extend(
+        [
+            of_files,
+            of_uses,
+            turns.of(&found),
+            of_bodies,
+            of_links,
+            missing,
+            corrections,
+        ]
+        .concat(),
+    );
     Ok(())
+}
+
+/// A joint moves in some recording.
+fn something_moves(
+    model: &RobotModel,
+    poses: &[Poses],
+    sources: &[Source],
+    longest: &robot::Tip,
+) -> Result<(), InitError> {
+    if poses.iter().any(|p| !session::moved(model, p).is_empty()) {
+        return Ok(());
+    }
+    Err(InitError::NoMotion {
+        files: shown(sources),
+        tip: model.link(longest.link).name.clone(),
+    })
+}
+
+/// The files as their messages name them.
+fn shown(sources: &[Source]) -> Vec<String> {
+    sources.iter().map(|s| s.file.shown.clone()).collect()
+}
+
+/// The poses of the files as they are read now, which the proposal then states.
+fn tables(
+    model: &RobotModel,
+    proposal: &mut Proposal,
+    drafts: &[Draft],
+    sources: &[Source],
+    found: &[Found],
+) -> Result<Vec<Poses>, InitError> {
+    proposal.recordings = recordings(drafts, sources);
+    tables::tables(model, proposal, drafts, sources, found)
 }
 
 /// An error of files that were given beside recordings of the profile, which were not read, says so.

@@ -1,4 +1,5 @@
-//! Quaternions whose columns are in another order than their names say: the column map lists them in the order of the file.
+//! Poses that are written otherwise than their columns' names say: the column map lists quaternions in the order of the file, or says that poses
+//! are inverted.
 
 use calib_checks::structural::PoseMistake;
 use calib_recording::{BodyColumns, ColumnMap};
@@ -8,7 +9,8 @@ use crate::columns;
 use crate::header::header;
 use crate::source::Source;
 
-/// The map with the quaternions of these bodies, by their names in the profile, in the other order; `None` where their columns are not found.
+/// The map with the poses of these bodies, by their names in the profile, as the file has them; `None` where their columns are not found, or no map
+/// says it.
 pub fn reordered(
     model: &RobotModel,
     source: &Source,
@@ -43,7 +45,7 @@ fn of_header(model: &RobotModel, source: &Source, name: &str, alone: bool) -> Op
     (alone && bodies.is_empty()).then_some(columns)
 }
 
-/// The same four columns, in the order of the file, under the other key.
+/// The same columns, as the file has them.
 fn swap(columns: &mut BodyColumns, mistake: PoseMistake) -> Option<()> {
     match mistake {
         PoseMistake::ScalarFirstReadAsLast => {
@@ -52,7 +54,8 @@ fn swap(columns: &mut BodyColumns, mistake: PoseMistake) -> Option<()> {
         PoseMistake::ScalarLastReadAsFirst => {
             columns.quaternion_xyzw = Some(columns.quaternion_wxyz.take()?);
         }
-        _ => return None,
+        PoseMistake::Inverse => columns.inverted = !columns.inverted,
+        PoseMistake::Transposed => return None,
     }
     Some(())
 }

@@ -149,3 +149,10 @@ pub fn joints(model: &RobotModel) -> About {
         in_degrees: named(&|j| in_degrees.contains(j)),
     }
 }
+
+/// Names of the ends of all chains.
+#[must_use]
+pub fn ends(model: &RobotModel) -> Vec<String> {
+    let tips = tips(model).into_iter();
+    tips.map(|tip| model.link(tip.link).name.clone()).collect()
+}

@@ -3,12 +3,13 @@
 use std::collections::BTreeMap;
 
 use calib_finding::{Fact, catalog};
-use calib_recording::{ColumnMap, ReadOptions, Recording, read_bytes};
+use calib_recording::{BodyColumns, ColumnMap, ReadOptions, Recording, read_bytes};
 use calib_urdf::RobotModel;
 
-use crate::columns::{self, Guess};
+use crate::columns;
 use crate::error::{InitError, NoRecording};
 use crate::fact::About;
+use crate::guess::Guess;
 use crate::header::header;
 use crate::instead::HEAD;
 
@@ -36,6 +37,8 @@ pub struct Source {
     pub facts: Vec<About>,
     /// Names of its columns or streams, for messages.
     pub names: Vec<String>,
+    /// Bodies whose orientation may be read in other ways, by their names in the file.
+    pub other_turns: BTreeMap<String, Vec<BodyColumns>>,
     /// The tracker's names of bodies and markers that the profile calls otherwise, by the profile's.
     renamed: BTreeMap<String, String>,
 }
@@ -72,7 +75,11 @@ impl Source {
             (_, Some(guess)) if !guess.joints.is_empty() || has_tracked(&guess.map) => {
                 let recording = mapped(file, &guess.map)?;
                 let facts = guess.facts;
-                Self::new(model, file, Some(guess.map), recording, facts, renamed)
+                let read = Self::new(model, file, Some(guess.map), recording, facts, renamed)?;
+                Ok(Self {
+                    other_turns: guess.other_turns,
+                    ..read
+                })
             }
             (own, _) => Self::new(model, file, None, own?, Vec::new(), renamed),
         }
@@ -123,6 +130,7 @@ impl Source {
             recording,
             facts,
             names,
+            other_turns: BTreeMap::new(),
             renamed: renamed.clone(),
         })
     }
@@ -134,14 +142,12 @@ impl Source {
     pub fn with_columns(&self, model: &RobotModel, columns: ColumnMap) -> Result<Self, InitError> {
         let recording = mapped(&self.file, &columns)?;
         let facts = self.facts.clone();
-        Self::new(
-            model,
-            &self.file,
-            Some(columns),
-            recording,
-            facts,
-            &self.renamed,
-        )
+        let file = &self.file;
+        let read = Self::new(model, file, Some(columns), recording, facts, &self.renamed)?;
+        Ok(Self {
+            other_turns: self.other_turns.clone(),
+            ..read
+        })
     }
 
     /// The error about columns that seem to hold times and could not be read.
@@ -246,8 +252,12 @@ fn suffices(model: &RobotModel, recording: &Recording, guess: Option<&Guess>) ->
     let (joints, things) = guess.map_or((0, 0), |g| {
         (g.joints.len(), g.map.markers.len() + g.map.bodies.len())
     });
+    // Three angles beside a position that is a marker by itself.
+    let turns = guess.map_or(0, |g| g.map.bodies.len());
     // A device's own format has its names in several lines, of which a map would see one.
     let of_device = recording.meta.format != "csv";
     let all_known = known == recording.joints.len();
-    all_known && (of_device || (known >= joints && tracked >= things)) && known + tracked > 0
+    all_known
+        && (of_device || (known >= joints && tracked >= things && recording.bodies.len() >= turns))
+        && known + tracked > 0
 }

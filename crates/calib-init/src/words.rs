@@ -3,6 +3,7 @@
 mod joints;
 mod known;
 mod mistakes;
+mod turns;
 
 pub use known::{next_of_absent, to_check, wrote};
 
@@ -92,6 +93,7 @@ pub fn sentence(about: &About) -> String {
         | About::Lengths { .. }
         | About::Time { .. }
         | About::Ignored { .. } => of_columns(about),
+        About::Turns { .. } => turns::sentence(about),
         About::Corrected { .. } | About::NotCorrected { .. } | About::SignOrMirror { .. } => {
             mistakes::sentence(about)
         }

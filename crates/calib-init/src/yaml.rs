@@ -86,6 +86,9 @@ pub fn columns(columns: &ColumnMap) -> Vec<(String, Value)> {
     if columns.angles != AngleUnit::Rad {
         line("angles", "deg".to_owned());
     }
+    if let Some(unit) = columns.body_angles {
+        line("body_angles", unit.name().to_owned());
+    }
     if columns.lengths != LengthUnit::M {
         line("lengths", columns.lengths.name().to_owned());
     }
@@ -133,7 +136,24 @@ fn body(name: &str, body: &BodyColumns) -> String {
         let columns = columns.as_ref().map(list);
         columns.map_or_else(String::new, |columns| format!(", {key}: {columns}"))
     });
-    let turn = turn.concat();
+    let angles = [
+        ("rotation_vector", &body.rotation_vector),
+        ("fixed_xyz", &body.fixed_xyz),
+    ];
+    let angles = angles.map(|(key, columns)| {
+        let columns = columns.as_ref().map(list);
+        columns.map_or_else(String::new, |columns| format!(", {key}: {columns}"))
+    });
+    let euler = body.euler.as_ref().map_or_else(String::new, |euler| {
+        let (axes, columns) = (euler.axes.name(), list(&euler.columns));
+        format!(", euler: {{axes: {axes}, columns: {columns}}}")
+    });
+    let inverted = if body.inverted {
+        ", inverted: true"
+    } else {
+        ""
+    };
+    let turn = turn.into_iter().chain(angles).collect::<String>() + &euler + inverted;
     format!(
         "{}: {{position: {}{turn}}}",
         text(name),

@@ -1,5 +1,6 @@
 //! A column map: what the columns of somebody else's table mean. The profile embeds it under a recording.
 
+use crate::euler::EulerAxes;
 use crate::units::{AngleUnit, LengthUnit, TimeUnit};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -27,6 +28,9 @@ pub struct ColumnMap {
     pub decimal_comma: bool,
     /// Unit of joint angles, rotation vectors and Euler angles in the mapped columns; a name that ends in `_deg` says it itself.
     pub angles: AngleUnit,
+    /// Unit of rotation vectors and Euler angles of bodies, where it is another one than that of the joints.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub body_angles: Option<AngleUnit>,
     /// Unit of positions and prismatic joints in the mapped columns; a name that ends in `_mm` says it itself.
     pub lengths: LengthUnit,
     /// The column of time, and its unit.
@@ -112,6 +116,44 @@ pub struct BodyColumns {
     /// Columns of angles about fixed x, y, z: `R = Rz(c)·Ry(b)·Rx(a)`, as URDF's rpy.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub fixed_xyz: Option<[String; 3]>,
+    /// Columns of angles about axes that turn with the body, and which axes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub euler: Option<EulerColumns>,
+    /// The columns hold the pose of the tracker in the body, as a camera's software states where the camera is: the inverse is used.
+    #[serde(skip_serializing_if = "is_false")]
+    pub inverted: bool,
+}
+
+impl BodyColumns {
+    /// All columns of the body, to be renamed.
+    pub fn all_mut(&mut self) -> impl Iterator<Item = &mut String> {
+        let quaternions = [&mut self.quaternion_xyzw, &mut self.quaternion_wxyz];
+        let angles = [&mut self.rotation_vector, &mut self.fixed_xyz];
+        let quaternions = quaternions.into_iter().flatten().flatten();
+        let angles = angles.into_iter().flatten().flatten();
+        let euler = self.euler.iter_mut().flat_map(|euler| &mut euler.columns);
+        let turns = quaternions.chain(angles).chain(euler);
+        self.position.iter_mut().chain(turns)
+    }
+}
+
+/// Whether a flag has its default.
+#[allow(
+    clippy::trivially_copy_pass_by_ref,
+    reason = "serde passes a reference"
+)]
+fn is_false(flag: &bool) -> bool {
+    !*flag
+}
+
+/// Columns of Euler angles: `zyx` with columns a, b, c is `R = Rz(a)·Ry(b)·Rx(c)`.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct EulerColumns {
+    /// The axes in the order of the rotations, each as the rotations before it have left it.
+    pub axes: EulerAxes,
+    /// Columns of the three angles, in the same order.
+    pub columns: [String; 3],
 }
 
 /// A table with one row per body or marker and frame.
@@ -217,6 +259,7 @@ impl ColumnMap {
         let without = ColumnMap {
             decimal_comma: false,
             angles: AngleUnit::default(),
+            body_angles: None,
             lengths: LengthUnit::default(),
             labels: Vec::new(),
             lost: Vec::new(),
@@ -248,6 +291,7 @@ impl ColumnMap {
             names: or(&self.names, &default.names, &base.names),
             decimal_comma: self.decimal_comma || base.decimal_comma,
             angles: or(&self.angles, &default.angles, &base.angles),
+            body_angles: self.body_angles.or(base.body_angles),
             lengths: or(&self.lengths, &default.lengths, &base.lengths),
             time: self.time.clone().or(base.time),
             joints: or(&self.joints, &default.joints, &base.joints),

@@ -28,6 +28,7 @@ mod column_map;
 mod date_time;
 mod encoding;
 mod error;
+mod euler;
 mod growth;
 mod map_fault;
 mod model;
@@ -40,10 +41,13 @@ mod table;
 mod text;
 mod units;
 
-pub use column_map::{BodyColumns, ColumnMap, Delimiter, LongColumns, PRESETS, TimeColumn};
+pub use column_map::{
+    BodyColumns, ColumnMap, Delimiter, EulerColumns, LongColumns, PRESETS, TimeColumn,
+};
 pub use date_time::{DateTime, date_time};
 pub use encoding::utf8;
 pub use error::{Against, At, Error, Problem};
+pub use euler::EulerAxes;
 pub use map_fault::{MapFault, StatedUnits};
 pub use model::{
     BodyStream, Filled, JointColumn, JointStream, JointUnit, MarkerSample, MarkerStream, Meta,

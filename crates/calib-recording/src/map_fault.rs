@@ -22,7 +22,7 @@ pub enum MapFault {
     /// The names of columns end in another unit than the map states.
     #[error("`{key}: {stated}` in the column map contradicts the name of column `{}`{}", .columns[0], others(.columns.len() - 1))]
     Unit {
-        /// `angles` or `lengths`.
+        /// `angles`, `body_angles` or `lengths`.
         key: &'static str,
         /// The unit that the map states.
         stated: &'static str,
@@ -103,7 +103,7 @@ impl MapFault {
                 format!("map the joint too: `joints: {{{joint}: <column>}}`, or remove it from `reversed`")
             }
             Self::Rotations { .. } => {
-                "give exactly one of `quaternion_xyzw`, `quaternion_wxyz`, `rotation_vector` and `fixed_xyz`"
+                "give exactly one of `quaternion_xyzw`, `quaternion_wxyz`, `rotation_vector`, `fixed_xyz` and `euler`"
                     .to_owned()
             }
             Self::LongKinds { .. } => {
@@ -118,6 +118,7 @@ impl MapFault {
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Quantity {
     Angle,
+    BodyAngle,
     Length,
     Other,
 }
@@ -177,7 +178,11 @@ impl ColumnMap {
     }
 
     /// Names of columns that contradict the units of the map.
-    fn unit_faults(&self, uses: &[Use<'_>], stated: StatedUnits) -> impl Iterator<Item = MapFault> {
+    fn unit_faults<'a>(
+        &self,
+        uses: &[Use<'a>],
+        stated: StatedUnits,
+    ) -> impl Iterator<Item = MapFault> + use<'a> {
         let fault = |key, stated, named: Vec<(&str, &'static str)>| {
             let first = named.first()?.1;
             let columns = named.iter().map(|(column, _)| (*column).to_owned());
@@ -189,12 +194,19 @@ impl ColumnMap {
             })
         };
         let of = |quantity: Quantity| uses.iter().filter(move |one| one.quantity == quantity);
+        let other_angle = |one: &Use<'a>, unit: AngleUnit| {
+            let own = angle_unit(one.column).filter(|own| *own != unit)?;
+            Some((one.column, own.name()))
+        };
         let angles = (stated.angles || self.angles != AngleUnit::default()).then(|| {
-            let named = of(Quantity::Angle).filter_map(|one| {
-                let own = angle_unit(one.column).filter(|own| *own != self.angles)?;
-                Some((one.column, own.name()))
-            });
+            let of_bodies = of(Quantity::BodyAngle).filter(|_| self.body_angles.is_none());
+            let named = of(Quantity::Angle).chain(of_bodies);
+            let named = named.filter_map(|one| other_angle(one, self.angles));
             fault("angles", self.angles.name(), named.collect())
+        });
+        let of_bodies = self.body_angles.map(|unit| {
+            let named = of(Quantity::BodyAngle).filter_map(|one| other_angle(one, unit));
+            fault("body_angles", unit.name(), named.collect())
         });
         let lengths = (stated.lengths || self.lengths != LengthUnit::default()).then(|| {
             let named = of(Quantity::Length).filter_map(|one| {
@@ -203,7 +215,7 @@ impl ColumnMap {
             });
             fault("lengths", self.lengths.name(), named.collect())
         });
-        [angles.flatten(), lengths.flatten()].into_iter().flatten()
+        [angles, of_bodies, lengths].into_iter().flatten().flatten()
     }
 
     /// Every body of the map with the keys that lead to it.
@@ -255,10 +267,10 @@ impl ColumnMap {
         }
         for (path, body) in self.body_columns() {
             let path: Vec<&str> = path.iter().map(String::as_str).collect();
-            for (key, columns, quantity) in body.columns() {
+            for (keys, columns, quantity) in body.columns() {
                 for (i, column) in columns.iter().enumerate() {
                     push(
-                        &[&path[..], &[key, &i.to_string()]].concat(),
+                        &[&path[..], keys, &[&i.to_string()]].concat(),
                         column,
                         quantity,
                     );
@@ -276,6 +288,7 @@ impl BodyColumns {
             self.quaternion_wxyz.is_some(),
             self.rotation_vector.is_some(),
             self.fixed_xyz.is_some(),
+            self.euler.is_some(),
         ]
         .into_iter()
         .map(usize::from)
@@ -283,31 +296,40 @@ impl BodyColumns {
     }
 
     /// The columns by key.
-    fn columns(&self) -> impl Iterator<Item = (&'static str, &[String], Quantity)> {
+    fn columns(&self) -> impl Iterator<Item = (&'static [&'static str], &[String], Quantity)> {
         fn of<const N: usize>(columns: &Option<[String; N]>) -> Option<&[String]> {
             columns.as_ref().map(<[String; N]>::as_slice)
         }
         [
-            ("position", Some(self.position.as_slice()), Quantity::Length),
             (
-                "quaternion_xyzw",
+                &["position"][..],
+                Some(self.position.as_slice()),
+                Quantity::Length,
+            ),
+            (
+                &["quaternion_xyzw"],
                 of(&self.quaternion_xyzw),
                 Quantity::Other,
             ),
             (
-                "quaternion_wxyz",
+                &["quaternion_wxyz"],
                 of(&self.quaternion_wxyz),
                 Quantity::Other,
             ),
             (
-                "rotation_vector",
+                &["rotation_vector"],
                 of(&self.rotation_vector),
-                Quantity::Angle,
+                Quantity::BodyAngle,
             ),
-            ("fixed_xyz", of(&self.fixed_xyz), Quantity::Angle),
+            (&["fixed_xyz"], of(&self.fixed_xyz), Quantity::BodyAngle),
+            (
+                &["euler", "columns"],
+                self.euler.as_ref().map(|e| e.columns.as_slice()),
+                Quantity::BodyAngle,
+            ),
         ]
         .into_iter()
-        .filter_map(|(key, columns, quantity)| Some((key, columns?, quantity)))
+        .filter_map(|(keys, columns, quantity)| Some((keys, columns?, quantity)))
     }
 }
 

@@ -194,7 +194,7 @@ super::topic! {
     POSE_CONVENTION = "pose-convention" {
         "inverse": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} with the poses of {bodies:code} inverted[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
-            "Export the pose of the body in the tracker's frame: the file has that of the tracker in the body's frame.";
+            "The file has the pose of the tracker in the body's frame. Say so in the column map, `columns: {bodies: {NAME: {position: [X, Y, Z], quaternion_xyzw: [X, Y, Z, W], inverted: true}}}`, or export the pose of the body in the tracker's frame.";
         "transposed": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} with the rotations of {bodies:code} transposed[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "Export the rotation from body to tracker coordinates: the file has its inverse.";

@@ -1,6 +1,6 @@
 //! Which facts a person must look at.
 
-use super::{About, CERTAIN};
+use super::{About, CERTAIN, TurnsHow};
 use crate::labels::LOOSE;
 
 /// How many times larger or smaller than stated the noise must be before that is one to look at.
@@ -33,6 +33,7 @@ pub(super) fn is_guess(about: &About) -> bool {
         } if !same.is_empty() || next.as_ref().is_some_and(|n| n.rms < CERTAIN * rms) => true,
         About::Rigid { sigma, .. } => sigma.is_some_and(|s| s >= LOOSE),
         About::Time { named, .. } => !named,
+        About::Turns { how, .. } => *how == TurnsHow::Assumed,
         About::Ignored {
             orientation,
             times,

@@ -94,6 +94,10 @@ fn found(mistake: &Mistake) -> String {
         Mistake::Quaternions { first: false } => {
             "The quaternions are written scalar last: x, y, z, w.".to_owned()
         }
+        Mistake::Inverted => {
+            "The poses are those of the tracker in the body, not of the body in the tracker's frame."
+                .to_owned()
+        }
         Mistake::Poses => "The convention of the tracked poses was misread.".to_owned(),
         Mistake::MissingColumn { joint } => {
             format!("Joint `{joint}` moved, and no column has its readings.")

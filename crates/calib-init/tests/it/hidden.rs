@@ -214,7 +214,7 @@ fn joints_named_like_coordinates_have_their_columns() {
         let header = calib_init::header::header(table.as_bytes()).expect("a table");
         calib_init::columns::guess(&model, &header)
     };
-    let keys = |guess: &calib_init::columns::Guess| -> Vec<String> {
+    let keys = |guess: &calib_init::guess::Guess| -> Vec<String> {
         guess
             .map
             .prismatic

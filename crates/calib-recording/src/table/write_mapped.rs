@@ -110,7 +110,9 @@ fn header(poses: &Poses, map: &ColumnMap, options: &WriteOptions) -> Vec<String>
         names.extend(body.position.iter().cloned());
         let quaternion = body.quaternion_xyzw.iter().chain(&body.quaternion_wxyz);
         names.extend(quaternion.flatten().cloned());
+        let euler = body.euler.as_ref().map(|euler| &euler.columns);
         let angles = body.rotation_vector.iter().chain(&body.fixed_xyz);
+        let angles = angles.chain(euler);
         names.extend(angles.flatten().cloned());
     }
     names.extend(map.markers.values().flatten().cloned());
@@ -197,14 +199,19 @@ fn values<'a>(
         let Some(track) = poses.bodies.get(&plan.name) else {
             continue;
         };
+        let inverted = plan.inverted;
+        let written = move |pose: Isometry3<f64>| match inverted {
+            true => pose.inverse(),
+            false => pose,
+        };
         for (i, slot) in plan.position.into_iter().enumerate() {
-            let at = move |row: usize| Some(track[row]?.translation.vector[i]);
+            let at = move |row: usize| Some(written(track[row]?).translation.vector[i]);
             put(slot, Box::new(at));
         }
         let form = plan.rotation;
         for (i, slot) in plan.rotation.slots().iter().enumerate() {
             let at = move |row: usize| {
-                let rotation = track[row]?.rotation;
+                let rotation = written(track[row]?).rotation;
                 Some(match form {
                     // q and −q are the same rotation: the scalar part is written ≥ 0.
                     Rotation::Quaternion(_) if rotation.w < 0.0 => -rotation.coords[i],
@@ -215,6 +222,7 @@ fn values<'a>(
                         let (a, b, c) = rotation.euler_angles();
                         [a, b, c][i]
                     }
+                    Rotation::Euler(axes, _) => axes.angles(&rotation)[i],
                 })
             };
             put(*slot, Box::new(at));

@@ -43,6 +43,35 @@ fn joints_x_y_and_z_beside_a_mapped_body_are_no_marker() {
     assert_eq!([of("x"), of("y"), of("z")], [0.1, 0.2, -0.05]);
 }
 
+/// Angles of a body in another unit than joints, about axes that turn, and a pose of the tracker in the body: by hand, 90° about z, then 90° about the new x.
+#[test]
+fn angles_about_turning_axes_are_read_as_they_say() {
+    let text = "j,x,y,z,a,b,c\n0.5,1,2,3,90,90,0\n";
+    let read = |inverted: bool| {
+        let body = format!(
+            r#"{{"joint_columns": ["j"], "bodies": {{"hand": {{"position": ["x", "y", "z"],
+            "euler": {{"axes": "zxy", "columns": ["a", "b", "c"]}}, "inverted": {inverted}}}}}, "body_angles": "deg"}}"#
+        );
+        let options = ReadOptions {
+            columns: Some(map(&body)),
+            ..ReadOptions::default()
+        };
+        let read = read_bytes("t.csv", text.as_bytes(), &options);
+        let read = read.unwrap_or_else(|e| panic!("{e}"));
+        read.poses(Filled::Exclude).expect("one table")
+    };
+    let straight = read(false);
+    assert_eq!(straight.joints["j"][0], Some(0.5));
+    let pose = straight.bodies["hand"][0].expect("given");
+    // The body's y is the tracker's z, its z the tracker's x.
+    let turned = pose * nalgebra::Vector3::new(0.0, 1.0, 0.0);
+    assert!((turned - nalgebra::Vector3::z()).norm() < 1e-12);
+    let turned = pose * nalgebra::Vector3::new(0.0, 0.0, 1.0);
+    assert!((turned - nalgebra::Vector3::x()).norm() < 1e-12);
+    let back = read(true).bodies["hand"][0].expect("given") * pose;
+    assert!(back.translation.vector.norm() < 1e-12 && back.rotation.angle() < 1e-12);
+}
+
 #[test]
 fn a_map_reads_back_what_was_written_for_it() {
     let poses = poses();
@@ -53,6 +82,8 @@ fn a_map_reads_back_what_was_written_for_it() {
         r#"{"bodies": {"hand": {"position": ["x", "y", "z"], "fixed_xyz": ["a", "b", "c"]}}, "angles": "deg", "delimiter": "semicolon"}"#,
         r#"{"bodies": {"hand": {"position": ["x", "y", "z"], "rotation_vector": ["a", "b", "c"]}}, "decimal_comma": true}"#,
         r#"{"bodies": {"hand": {"position": ["x", "y", "z"], "quaternion_wxyz": ["a", "b", "c", "d"]}}, "delimiter": "space", "skip_lines": 3}"#,
+        r#"{"bodies": {"hand": {"position": ["x", "y", "z"], "euler": {"axes": "zyz", "columns": ["o", "a", "t"]}}}, "body_angles": "deg"}"#,
+        r#"{"bodies": {"hand": {"position": ["x", "y", "z"], "euler": {"axes": "xyz", "columns": ["u", "v", "w"]}, "inverted": true}}}"#,
         r#"{"joints": {"elbow": "A1"}, "time": {"column": "t", "unit": "ms"}, "delimiter": "tab"}"#,
         r#"{"names": ["e", "l", "w", "x", "y", "z", "u", "v", "s", "p", "q", "r", "a", "b", "c", "d", "n"],
             "joints": {"elbow": "e", "wrist": "w"}, "prismatic": {"lift": "l"}, "torques": {"elbow": "n"},

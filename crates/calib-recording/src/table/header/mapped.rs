@@ -22,6 +22,7 @@ pub(super) fn apply(
         layout,
         mapped,
         angle: map.angles,
+        body_angle: map.body_angles.unwrap_or(map.angles),
         length: map.lengths,
     };
     if let Some(time) = &map.time {
@@ -58,6 +59,8 @@ struct Mapping<'a> {
     mapped: &'a mut [bool],
     /// Unit of angles in columns whose names end in none.
     angle: AngleUnit,
+    /// The same of rotation vectors and Euler angles.
+    body_angle: AngleUnit,
     /// Unit of lengths in columns whose names end in none.
     length: LengthUnit,
 }
@@ -107,6 +110,11 @@ impl Mapping<'_> {
     /// Units per radian of a column: of its name where that ends in a unit, else of the map.
     fn angles(&self, column: &str) -> f64 {
         angle_unit(column).unwrap_or(self.angle).per_radian()
+    }
+
+    /// Units per radian of a column of a body's orientation.
+    fn body_angles(&self, column: &str) -> f64 {
+        angle_unit(column).unwrap_or(self.body_angle).per_radian()
     }
 
     /// Units per meter of a column: of its name where that ends in a unit, else of the map.
@@ -192,6 +200,7 @@ impl Mapping<'_> {
                 name: name.to_string(),
                 position,
                 rotation,
+                inverted: columns.inverted,
             });
         }
         Ok(())
@@ -199,47 +208,28 @@ impl Mapping<'_> {
 
     /// The one rotation of a body.
     fn rotation(&mut self, what: &str, columns: &BodyColumns) -> Result<Rotation, Problem> {
-        match columns {
-            BodyColumns {
-                quaternion_xyzw: Some([x, y, z, w]),
-                quaternion_wxyz: None,
-                rotation_vector: None,
-                fixed_xyz: None,
-                ..
+        let count = columns.rotation_count();
+        let quaternion = match (&columns.quaternion_xyzw, &columns.quaternion_wxyz) {
+            _ if count != 1 => None,
+            (Some([x, y, z, w]), _) | (None, Some([w, x, y, z])) => Some(([x, y, z], w)),
+            (None, None) => None,
+        };
+        if let Some((vector, w)) = quaternion {
+            let [x, y, z] = self.three(what, &vector.map(String::clone), |_, _| 1.0)?;
+            let i = self.position(what, w)?;
+            let w = self.layout.slot(i, SlotKind::Tracker, 1.0);
+            return Ok(Rotation::Quaternion([x, y, z, w]));
+        }
+        let mut angles = |columns| self.three(what, columns, Self::body_angles);
+        match (&columns.rotation_vector, &columns.fixed_xyz, &columns.euler) {
+            (Some(vector), _, _) if count == 1 => Ok(Rotation::Vector(angles(vector)?)),
+            (_, Some(fixed), _) if count == 1 => Ok(Rotation::FixedXyz(angles(fixed)?)),
+            (_, _, Some(euler)) if count == 1 => {
+                Ok(Rotation::Euler(euler.axes, angles(&euler.columns)?))
             }
-            | BodyColumns {
-                quaternion_wxyz: Some([w, x, y, z]),
-                quaternion_xyzw: None,
-                rotation_vector: None,
-                fixed_xyz: None,
-                ..
-            } => {
-                let [x, y, z] = self.three(what, &[x.clone(), y.clone(), z.clone()], |_, _| 1.0)?;
-                let i = self.position(what, w)?;
-                let w = self.layout.slot(i, SlotKind::Tracker, 1.0);
-                Ok(Rotation::Quaternion([x, y, z, w]))
-            }
-            BodyColumns {
-                rotation_vector: Some(columns),
-                quaternion_xyzw: None,
-                quaternion_wxyz: None,
-                fixed_xyz: None,
-                ..
-            } => Ok(Rotation::Vector(self.three(what, columns, Self::angles)?)),
-            BodyColumns {
-                fixed_xyz: Some(columns),
-                quaternion_xyzw: None,
-                quaternion_wxyz: None,
-                rotation_vector: None,
-                ..
-            } => Ok(Rotation::FixedXyz(self.three(
-                what,
-                columns,
-                Self::angles,
-            )?)),
             _ => Err(Problem::ColumnMap(MapFault::Rotations {
                 path: vec![what.to_string()],
-                count: columns.rotation_count(),
+                count,
             })),
         }
     }

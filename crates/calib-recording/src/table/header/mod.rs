@@ -10,6 +10,7 @@ pub(crate) use naming::{JOINT, is_canonical, is_text_column, length_unit, reads_
 
 use crate::column_map::ColumnMap;
 use crate::error::{At, Placed, Problem};
+use crate::euler::EulerAxes;
 use crate::model::JointUnit;
 use crate::table::stated_unit::{StatedUnit, UnitRow};
 use crate::units::TimeUnit;
@@ -63,13 +64,16 @@ pub(super) enum Rotation {
     Quaternion([usize; 4]),
     Vector([usize; 3]),
     FixedXyz([usize; 3]),
+    Euler(EulerAxes, [usize; 3]),
 }
 
 impl Rotation {
     pub(super) fn slots(&self) -> &[usize] {
         match self {
             Rotation::Quaternion(slots) => slots,
-            Rotation::Vector(slots) | Rotation::FixedXyz(slots) => slots,
+            Rotation::Vector(slots) | Rotation::FixedXyz(slots) | Rotation::Euler(_, slots) => {
+                slots
+            }
         }
     }
 }
@@ -83,6 +87,8 @@ pub(super) struct BodyPlan {
     pub name: String,
     pub position: [usize; 3],
     pub rotation: Rotation,
+    /// The numbers are the pose of the tracker in the body.
+    pub inverted: bool,
 }
 
 #[derive(Default)]

@@ -217,6 +217,7 @@ impl Layout {
                 name: full_name.to_string(),
                 position,
                 rotation: Rotation::Quaternion(q),
+                inverted: false,
             });
         } else {
             if let Some(&(column, _)) = entity.parts.get(&Part::State) {

@@ -161,7 +161,9 @@ impl Layout {
         for body in &self.bodies {
             let quantity = match body.rotation {
                 Rotation::Quaternion(_) => Quantity::None,
-                Rotation::Vector(_) | Rotation::FixedXyz(_) => Quantity::Angle,
+                Rotation::Vector(_) | Rotation::FixedXyz(_) | Rotation::Euler(..) => {
+                    Quantity::Angle
+                }
             };
             body.rotation
                 .slots()

@@ -62,7 +62,9 @@ impl Rows<'_> {
             name,
             position,
             rotation,
+            inverted,
         } = &self.layout.bodies[index];
+        let inverted = *inverted;
         let name = self.name_of(name).to_string();
         let slots = position.iter().chain(rotation.slots());
         let needed = 3 + rotation.slots().len();
@@ -121,11 +123,10 @@ impl Rows<'_> {
                 let [a, b, c] = slots.map(value);
                 UnitQuaternion::from_euler_angles(a, b, c)
             }
+            Rotation::Euler(axes, slots) => axes.rotation(slots.map(value)),
         };
         let [x, y, z] = position.map(value);
-        Ok(Some(Isometry3::from_parts(
-            Translation3::new(x, y, z),
-            rotation,
-        )))
+        let pose = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
+        Ok(Some(if inverted { pose.inverse() } else { pose }))
     }
 }

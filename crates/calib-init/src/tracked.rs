@@ -1,0 +1,452 @@
+//! Columns of what a tracker sees: positions in threes, and the orientations beside them in the notations that are in use.
+//!
+//! A quaternion is known by its letters or its length. Three angles are known as such by their names, which do not say in which order the rotations
+//! follow each other, or whether they are a rotation vector: the usual way for such names is taken, and the others are kept for the motion to decide
+//! ([`turns`](crate::turns)).
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use calib_recording::{AngleUnit, BodyColumns, EulerAxes, EulerColumns};
+
+use crate::fact::{About, Notation, TurnsHow};
+use crate::guess::{Guess, TURN};
+use crate::header::Header;
+use crate::name::{self, NamedUnit};
+
+/// How far the length of a quaternion may be from 1.
+const UNIT: f64 = 5e-3;
+
+/// Columns of one thing: what stands around the letter → the columns by letter.
+type Groups = BTreeMap<(String, String), [Option<usize>; 4]>;
+
+/// Columns in threes (x, y, z) and in fours (a quaternion), but for those of joints.
+pub(crate) fn tracked(
+    header: &Header,
+    guess: &mut Guess,
+    used: &mut BTreeSet<usize>,
+    joints: &BTreeSet<usize>,
+) {
+    let (mut places, mut turns) = (Groups::new(), Groups::new());
+    let free = |i: &usize| !used.contains(i) && !joints.contains(i) && header.has_numbers(*i);
+    let free: Vec<usize> = (0..header.names.len()).filter(free).collect();
+    for &i in &free {
+        let unit = header.unit(i);
+        if !matches!(unit.unit, None | Some(NamedUnit::Length(_))) {
+            continue;
+        }
+        for (k, letter) in ['x', 'y', 'z', 'w'].into_iter().enumerate() {
+            if let Some((before, behind)) = name::quaternion(unit.stem, letter) {
+                let group = turns.entry((before.to_owned(), behind.to_owned()));
+                group.or_default()[k].get_or_insert(i);
+            } else if k < 3
+                && let Some((before, behind)) = name::coordinate(unit.stem, letter)
+                && !name::is_no_place(unit.stem)
+            {
+                let group = places.entry((before.to_owned(), behind.to_owned()));
+                group.or_default()[k].get_or_insert(i);
+            }
+        }
+    }
+    let names = |columns: &[usize]| -> Vec<String> {
+        columns.iter().map(|i| header.names[*i].clone()).collect()
+    };
+    let mut named: BTreeMap<String, [usize; 3]> = BTreeMap::new();
+    for ((before, behind), columns) in &places {
+        if let [Some(x), Some(y), Some(z), _] = *columns {
+            named.insert(name::of_rest(before, behind, 'm'), [x, y, z]);
+        }
+    }
+    for ((before, behind), columns) in &turns {
+        let name = name::of_rest(before, behind, 'm');
+        if let [Some(x), Some(y), Some(z), Some(w)] = *columns
+            && let Some(position) = named.remove(&name)
+        {
+            used.extend(position.iter().chain(&[x, y, z, w]));
+            let body = BodyColumns {
+                position: names(&position).try_into().unwrap_or_default(),
+                quaternion_xyzw: names(&[x, y, z, w]).try_into().ok(),
+                ..BodyColumns::default()
+            };
+            guess.map.bodies.insert(name, body);
+        }
+    }
+    other_notations(header, guess, used, &free);
+    for (name, position) in named {
+        let is_used = position.iter().any(|i| used.contains(i));
+        if is_used || name::is_no_position(&header.names[position[0]]) {
+            continue;
+        }
+        used.extend(position);
+        let position = names(&position).try_into().unwrap_or_default();
+        guess.map.markers.insert(name, position);
+    }
+}
+
+/// Names of three angles, or of four numbers of a quaternion.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+enum Set {
+    /// x, y, z, w, or the numbers of a quaternion.
+    Quaternion,
+    /// A quaternion's numbers in their order.
+    Numbered,
+    /// A rotation vector.
+    Vector,
+    /// `rx`, `rot_x`: a rotation vector or angles.
+    AboutAxes,
+    /// Angles about x, y, z: `roll`, `euler_x`.
+    Angles,
+    /// `a`, `b`, `c` of a KUKA controller: about z, y, x.
+    Abc,
+    /// `w`, `p`, `r` of a FANUC controller: about x, y, z.
+    Wpr,
+    /// `o`, `a`, `t` of a Kawasaki controller: about z, y, z.
+    Oat,
+}
+
+/// What a column is of, by its name: what the columns of one thing have in common, its set or a position, and its place in it.
+struct Part {
+    of: String,
+    set: Option<Set>,
+    at: usize,
+}
+
+/// Words before the letter or number of a position.
+const PLACES: [&str; 6] = ["position", "pos", "translation", "trans", "tvec", "xyz"];
+/// Words before the letter or number of an orientation.
+const TURNS: [&str; 7] = [
+    "orientation",
+    "orient",
+    "rotation",
+    "rot",
+    "quaternion",
+    "quat",
+    "q",
+];
+/// Words before the letter of an angle.
+const ANGLES: [&str; 5] = ["euler", "rpy", "angle", "angles", "eul"];
+/// Words before the letter or number of a rotation vector.
+const VECTORS: [&str; 5] = ["rvec", "rotvec", "rodrigues", "rotationvector", "rotvector"];
+/// Words that say of a body that it has a pose.
+const FILLERS: [&str; 4] = ["pose", "transform", "field", "data"];
+
+impl Part {
+    /// All readings of a name without its unit.
+    fn all(stem: &str) -> Vec<Self> {
+        let all = name::words(stem);
+        let mut found = Vec::new();
+        let Some((last, words)) = all.split_last() else {
+            return found;
+        };
+        let mut add = |words: usize, behind: &str, set, at| {
+            let of = of_words(stem, &all[..words], behind);
+            found.push(Self { of, set, at });
+        };
+        let count = words.len();
+        let before = words.last().map_or("", String::as_str);
+        if let Ok(number) = last.parse::<usize>() {
+            if matches!(before, "q" | "quat" | "quaternion" | "orientation") {
+                add(count, "", Some(Set::Numbered), number);
+            } else if VECTORS.contains(&before) {
+                add(count, "", Some(Set::Vector), number);
+            } else if PLACES.contains(&before) {
+                add(count, "", None, number);
+            }
+            // `rx1` is of the first body.
+            if let Some((letter, words)) = words.split_last()
+                && let Some((set, at)) = of_letter(letter, words)
+            {
+                add(words.len(), last, set, at);
+            }
+        } else if let Some((set, at)) = of_letter(last, words) {
+            add(count, "", set, at);
+        }
+        found
+    }
+}
+
+/// The name of one thing: the words of a column before those of a position or an orientation, and without fillers.
+fn of_words(stem: &str, words: &[String], behind: &str) -> String {
+    let is_kind = |word: &String| {
+        let kinds = [&PLACES[..], &TURNS, &ANGLES, &VECTORS, &FILLERS];
+        kinds.iter().any(|kind| kind.contains(&word.as_str()))
+    };
+    let first = usize::from(words.first().is_some_and(|word| word == "field"));
+    let end = words
+        .iter()
+        .rposition(|word| !is_kind(word))
+        .map_or(0, |at| at + 1);
+    let spans = name::spans(stem);
+    let kept = match end > first {
+        true => &stem[spans[first].start..spans[end - 1].end],
+        false => "",
+    };
+    let plain = |c: char| c.is_alphanumeric() || matches!(c, '-' | '.');
+    let kept: String = kept
+        .chars()
+        .map(|c| if plain(c) { c } else { '_' })
+        .collect();
+    match (kept.is_empty(), behind.is_empty()) {
+        (false, false) => format!("{kept}_{behind}"),
+        _ => kept + behind,
+    }
+}
+
+/// What a letter, or a word of letters, says behind these words.
+fn of_letter(last: &str, words: &[String]) -> Option<(Option<Set>, usize)> {
+    let before = words.last().map_or("", String::as_str);
+    let of = |letters: &[&str]| letters.iter().position(|letter| *letter == last);
+    if let Some(at) = of(&["qx", "qy", "qz", "qw"]) {
+        return Some((Some(Set::Quaternion), at));
+    }
+    if let Some(at) = of(&["rx", "ry", "rz"]) {
+        return Some((Some(Set::AboutAxes), at));
+    }
+    if let Some(at) = of(&["roll", "pitch", "yaw"]) {
+        return Some((Some(Set::Angles), at));
+    }
+    if let Some(at) = of(&["tx", "ty", "tz"]).or_else(|| of(&["px", "py", "pz"])) {
+        return Some((None, at));
+    }
+    if let Some(at) = of(&["x", "y", "z", "w"]) {
+        let vector =
+            VECTORS.contains(&before) || words.ends_with(&["rotation".into(), "vector".into()]);
+        let set = match before {
+            _ if vector && at < 3 => Some(Set::Vector),
+            word if TURNS.contains(&word) && at < 3 => Some(Set::AboutAxes),
+            word if TURNS.contains(&word) => Some(Set::Quaternion),
+            word if ANGLES.contains(&word) && at < 3 => Some(Set::Angles),
+            _ => None,
+        };
+        if at < 3 || set.is_some() {
+            return Some((set, at));
+        }
+    }
+    let sets = [
+        (Set::Abc, ["a", "b", "c"]),
+        (Set::Wpr, ["w", "p", "r"]),
+        (Set::Oat, ["o", "a", "t"]),
+    ];
+    // A letter alone, or the last of a name, which stands in one set or in two.
+    let found = sets
+        .into_iter()
+        .find_map(|(set, letters)| Some((set, of(&letters)?)))?;
+    Some((Some(found.0), found.1))
+}
+
+/// Positions with an orientation beside them in another notation than `qx` to `qw`.
+fn other_notations(header: &Header, guess: &mut Guess, used: &mut BTreeSet<usize>, free: &[usize]) {
+    let mut places: BTreeMap<String, BTreeMap<usize, usize>> = BTreeMap::new();
+    let mut turns: BTreeMap<String, BTreeMap<Set, BTreeMap<usize, usize>>> = BTreeMap::new();
+    for &i in free.iter().filter(|i| !used.contains(i)) {
+        let unit = header.unit(i);
+        if name::is_no_place(unit.stem) {
+            continue;
+        }
+        for part in Part::all(unit.stem) {
+            let fits = match (part.set, unit.unit) {
+                (_, None) => true,
+                (None, Some(NamedUnit::Length(_))) => true,
+                (Some(set), Some(NamedUnit::Angle(_))) => set > Set::Numbered,
+                _ => false,
+            };
+            if !fits {
+                continue;
+            }
+            match part.set {
+                None => places.entry(part.of).or_default(),
+                Some(set) => turns.entry(part.of).or_default().entry(set).or_default(),
+            }
+            .entry(part.at)
+            .or_insert(i);
+            // `a` is of two sets.
+            if part.set == Some(Set::Abc) && part.at == 0 {
+                let of = Part::all(unit.stem).remove(0).of;
+                let oat = turns.entry(of).or_default().entry(Set::Oat).or_default();
+                oat.entry(1).or_insert(i);
+            }
+        }
+    }
+    for (of, place) in places {
+        let Some(place) = in_order::<3>(&place) else {
+            continue;
+        };
+        let Some(sets) = turns.get(&of) else {
+            continue;
+        };
+        let is_free = |columns: &[usize]| columns.iter().all(|i| !used.contains(i));
+        let orientation = orientation(header, sets);
+        let Some((columns, mut ways)) = orientation.filter(|(columns, _)| is_free(columns)) else {
+            continue;
+        };
+        if !is_free(&place) {
+            continue;
+        }
+        used.extend(place.iter().chain(&columns));
+        for way in &mut ways {
+            way.position = place.map(|i| header.names[i].clone());
+        }
+        let body = ways.remove(0);
+        // A number alone is no name.
+        let name = match of.parse::<u32>() {
+            Ok(number) => format!("m{number}"),
+            Err(_) if of.is_empty() => "m".to_owned(),
+            Err(_) => of,
+        };
+        if !ways.is_empty() {
+            guess.other_turns.insert(name.clone(), ways);
+        }
+        guess.map.bodies.insert(name, body);
+    }
+}
+
+/// Columns by their numbers, which count from 0 or from 1.
+fn in_order<const N: usize>(columns: &BTreeMap<usize, usize>) -> Option<[usize; N]> {
+    let first = *columns.keys().next()?;
+    let all: Vec<usize> = (first..first + N)
+        .filter_map(|at| columns.get(&at).copied())
+        .collect();
+    let whole = first < 2 && columns.len() == N;
+    all.try_into().ok().filter(|_| whole)
+}
+
+/// The orientation of a body: its columns, and how they may be read, the usual way first.
+fn orientation(
+    header: &Header,
+    sets: &BTreeMap<Set, BTreeMap<usize, usize>>,
+) -> Option<(Vec<usize>, Vec<BodyColumns>)> {
+    let names = |columns: &[usize]| -> Vec<String> {
+        columns.iter().map(|i| header.names[*i].clone()).collect()
+    };
+    let numbers = |set: Set| sets.get(&set).into_iter().flatten();
+    // `rot_x` to `rot_z` beside `rot_w`.
+    let letters = numbers(Set::AboutAxes).chain(numbers(Set::Quaternion));
+    let letters: BTreeMap<usize, usize> = letters.map(|(at, i)| (*at, *i)).collect();
+    if let Some(columns) = in_order::<4>(&letters) {
+        if !is_unit(header, &columns) {
+            return None;
+        }
+        let way = BodyColumns {
+            quaternion_xyzw: names(&columns).try_into().ok(),
+            ..BodyColumns::default()
+        };
+        return Some((columns.to_vec(), vec![way]));
+    }
+    if let Some(columns) = sets.get(&Set::Numbered).and_then(in_order::<4>)
+        && is_unit(header, &columns)
+    {
+        // `q0` is the scalar part nearly everywhere; if not, the motion shows it.
+        let way = BodyColumns {
+            quaternion_wxyz: names(&columns).try_into().ok(),
+            ..BodyColumns::default()
+        };
+        return Some((columns.to_vec(), vec![way]));
+    }
+    let angles = sets.iter().filter(|(set, _)| **set > Set::Numbered);
+    angles.into_iter().find_map(|(set, columns)| {
+        let columns = in_order::<3>(columns)?;
+        let degrees = unit_of(header, &columns).1 == AngleUnit::Deg;
+        let of: [String; 3] = names(&columns).try_into().ok()?;
+        Some((columns.to_vec(), ways(*set, &of, degrees)))
+    })
+}
+
+/// Whether four columns are quaternions in all of their rows.
+fn is_unit(header: &Header, columns: &[usize; 4]) -> bool {
+    let rows = header.columns[columns[0]].len();
+    let length = |row: usize| {
+        let squares = columns.map(|i| header.columns[i][row].map(|x| x * x));
+        squares.into_iter().sum::<Option<f64>>().map(f64::sqrt)
+    };
+    let mut lengths = (0..rows)
+        .filter_map(length)
+        .filter(|l| *l != 0.0)
+        .peekable();
+    lengths.peek().is_some() && lengths.all(|l| (l - 1.0).abs() < UNIT)
+}
+
+/// How three columns may be read, the usual way first.
+fn ways(set: Set, columns: &[String; 3], degrees: bool) -> Vec<BodyColumns> {
+    let vector = BodyColumns {
+        rotation_vector: Some(columns.clone()),
+        ..BodyColumns::default()
+    };
+    let euler = |axes: EulerAxes, columns: [String; 3]| BodyColumns {
+        euler: Some(EulerColumns { axes, columns }),
+        ..BodyColumns::default()
+    };
+    // Columns about x, y and z, in the order of the axes.
+    let about = |axes: EulerAxes| match axes {
+        EulerAxes::Zyx => BodyColumns {
+            fixed_xyz: Some(columns.clone()),
+            ..BodyColumns::default()
+        },
+        _ => euler(axes, axes.axes().map(|axis| columns[axis].clone())),
+    };
+    let orders = [
+        EulerAxes::Zyx,
+        EulerAxes::Xyz,
+        EulerAxes::Zxy,
+        EulerAxes::Yxz,
+        EulerAxes::Yzx,
+        EulerAxes::Xzy,
+    ];
+    let orders = || orders.into_iter().map(about);
+    let written = |axes: EulerAxes| std::iter::once(euler(axes, columns.clone()));
+    match set {
+        Set::Quaternion | Set::Numbered => Vec::new(),
+        Set::Vector => vec![vector],
+        Set::AboutAxes if degrees => orders().chain([vector]).collect(),
+        Set::AboutAxes => std::iter::once(vector).chain(orders()).collect(),
+        Set::Angles | Set::Wpr => orders().collect(),
+        Set::Abc => written(EulerAxes::Zyx).chain(orders()).collect(),
+        Set::Oat => written(EulerAxes::Zyz)
+            .chain(written(EulerAxes::Zyx))
+            .collect(),
+    }
+}
+
+/// The unit of some angles, and whether the readers find it in their names.
+fn unit_of(header: &Header, columns: &[usize]) -> (bool, AngleUnit) {
+    let named = columns.iter().find_map(|i| {
+        let unit = header.unit(*i);
+        match unit.unit {
+            Some(NamedUnit::Angle(angle)) => Some((unit.native, angle)),
+            _ => None,
+        }
+    });
+    let largest = columns.iter().map(|i| header.largest(*i));
+    let by_size = match largest.fold(0.0, f64::max) > TURN {
+        true => AngleUnit::Deg,
+        false => AngleUnit::Rad,
+    };
+    named.unwrap_or((false, by_size))
+}
+
+/// States the unit of orientations where it is another one than that of the joints, and says how they are read.
+pub(crate) fn unit_of_turns(header: &Header, guess: &mut Guess) {
+    for (body, columns) in &guess.map.bodies {
+        let Some((notation, names)) = Notation::of(columns) else {
+            continue;
+        };
+        let of: Vec<usize> = names.iter().filter_map(|n| header.position(n)).collect();
+        let mut unit = None;
+        if !matches!(notation, Notation::Quaternion { .. }) {
+            let (native, angle) = unit_of(header, &of);
+            if !native && angle != guess.map.angles {
+                guess.map.body_angles = Some(angle);
+            }
+            unit = Some(angle);
+        } else if !matches!(notation, Notation::Quaternion { scalar_first: true }) {
+            continue;
+        }
+        // What the motion is to decide is said then.
+        if !guess.other_turns.contains_key(body) {
+            guess.facts.push(About::Turns {
+                columns: names,
+                notation,
+                unit,
+                how: TurnsHow::Named,
+            });
+        }
+    }
+}

@@ -1,0 +1,389 @@
+//! Orientations in the notations of other programs: `calib init` reads them, the motion decides where names do not, and a run gives what it gives
+//! for quaternions.
+
+use crate::scratch;
+
+use calib_urdf::RobotModel;
+use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion, Vector3};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{Distribution, StandardNormal};
+use scratch::Scratch;
+
+/// Axis and origin of each joint, m.
+const JOINTS: [(&str, [f64; 3]); 6] = [
+    ("0 0 1", [0.0, 0.0, 0.32]),
+    ("0 1 0", [0.05, 0.07, 0.1]),
+    ("0 1 0", [0.0, -0.03, 0.45]),
+    ("0 0 1", [0.04, 0.0, 0.25]),
+    ("0 1 0", [0.0, 0.0, 0.22]),
+    ("0 0 1", [0.0, 0.0, 0.09]),
+];
+/// σ of a position, m, and of an orientation, rad.
+const NOISE: (f64, f64) = (2e-4, 5e-4);
+
+fn arm() -> String {
+    let mut text = "<robot name=\"arm\">\n  <link name=\"l0\"/>\n".to_owned();
+    for (i, (axis, [x, y, z])) in JOINTS.iter().enumerate() {
+        text += &format!(
+            "  <link name=\"l{n}\"/>\n  <joint name=\"j{n}\" type=\"revolute\">\n    <parent link=\"l{i}\"/>\n    <child link=\"l{n}\"/>\n    \
+             <origin xyz=\"{x} {y} {z}\"/>\n    <axis xyz=\"{axis}\"/>\n    <limit lower=\"-3\" upper=\"3\" effort=\"50\" velocity=\"2\"/>\n  </joint>\n",
+            n = i + 1
+        );
+    }
+    text + "</robot>\n"
+}
+
+/// A way to write a pose: the names of its columns, the numbers, and what the column map must say of it.
+struct Way {
+    names: &'static str,
+    numbers: fn(&Isometry3<f64>) -> Vec<f64>,
+    map: &'static str,
+}
+
+fn place(pose: &Isometry3<f64>, per_meter: f64) -> Vec<f64> {
+    pose.translation
+        .vector
+        .iter()
+        .map(|v| v * per_meter)
+        .collect()
+}
+
+fn with(mut place: Vec<f64>, turn: impl IntoIterator<Item = f64>) -> Vec<f64> {
+    place.extend(turn);
+    place
+}
+
+fn degrees(angles: [f64; 3]) -> [f64; 3] {
+    angles.map(f64::to_degrees)
+}
+
+/// Roll, pitch and yaw about fixed axes: by the formula of URDF's own definition.
+fn fixed(pose: &Isometry3<f64>) -> [f64; 3] {
+    let r = pose.rotation.to_rotation_matrix();
+    [
+        r[(2, 1)].atan2(r[(2, 2)]),
+        (-r[(2, 0)]).asin(),
+        r[(1, 0)].atan2(r[(0, 0)]),
+    ]
+}
+
+/// Angles about x, the new y and the new z.
+fn turning(pose: &Isometry3<f64>) -> [f64; 3] {
+    let r = pose.rotation.to_rotation_matrix();
+    [
+        (-r[(1, 2)]).atan2(r[(2, 2)]),
+        r[(0, 2)].asin(),
+        (-r[(0, 1)]).atan2(r[(0, 0)]),
+    ]
+}
+
+/// Angles about z, the new y and the new z.
+fn zyz(pose: &Isometry3<f64>) -> [f64; 3] {
+    let r = pose.rotation.to_rotation_matrix();
+    [
+        r[(1, 2)].atan2(r[(0, 2)]),
+        r[(2, 2)].acos(),
+        r[(2, 1)].atan2(-r[(2, 0)]),
+    ]
+}
+
+fn vector(pose: &Isometry3<f64>) -> Vec<f64> {
+    pose.rotation.scaled_axis().iter().copied().collect()
+}
+
+fn scalar_last(pose: &Isometry3<f64>) -> Vec<f64> {
+    pose.rotation.coords.iter().copied().collect()
+}
+
+fn scalar_first(pose: &Isometry3<f64>) -> Vec<f64> {
+    let Quaternion { coords } = *pose.rotation.quaternion();
+    vec![coords.w, coords.x, coords.y, coords.z]
+}
+
+/// What cameras, controllers and loggers write.
+const WAYS: [Way; 13] = [
+    Way {
+        names: "tvec_x,tvec_y,tvec_z,rvec_x,rvec_y,rvec_z",
+        numbers: |p| with(place(p, 1.0), vector(p)),
+        map: "rotation_vector: [rvec_x, rvec_y, rvec_z]",
+    },
+    Way {
+        names: "tvec_0,tvec_1,tvec_2,rvec_0,rvec_1,rvec_2",
+        numbers: |p| with(place(p, 1e3), vector(p)),
+        map: "rotation_vector: [rvec_0, rvec_1, rvec_2]",
+    },
+    Way {
+        names: "flange_x,flange_y,flange_z,flange_rx,flange_ry,flange_rz",
+        numbers: |p| with(place(p, 1.0), vector(p)),
+        map: "flange: {position: [flange_x, flange_y, flange_z], rotation_vector: [flange_rx, flange_ry, flange_rz]}",
+    },
+    Way {
+        names: "flange.x,flange.y,flange.z,flange.rx,flange.ry,flange.rz",
+        numbers: |p| with(place(p, 1.0), degrees(turning(p))),
+        map: "euler: {axes: xyz, columns: [flange.rx, flange.ry, flange.rz]}",
+    },
+    Way {
+        names: "Tx,Ty,Tz,Rx,Ry,Rz",
+        numbers: |p| with(place(p, 1e3), degrees(fixed(p))),
+        map: "fixed_xyz: [Rx, Ry, Rz]",
+    },
+    Way {
+        names: "X [mm],Y [mm],Z [mm],Roll [deg],Pitch [deg],Yaw [deg]",
+        numbers: |p| with(place(p, 1e3), degrees(fixed(p))),
+        map: r#"fixed_xyz: ["Roll [deg]", "Pitch [deg]", "Yaw [deg]"]"#,
+    },
+    Way {
+        names: "X,Y,Z,A,B,C",
+        numbers: |p| {
+            let [x, y, z] = degrees(fixed(p));
+            with(place(p, 1e3), [z, y, x])
+        },
+        map: "euler: {axes: zyx, columns: [A, B, C]}",
+    },
+    Way {
+        names: "X,Y,Z,O,A,T",
+        numbers: |p| with(place(p, 1e3), degrees(zyz(p))),
+        map: "euler: {axes: zyz, columns: [O, A, T]}",
+    },
+    Way {
+        names: "hand_pos_x,hand_pos_y,hand_pos_z,hand_euler_x,hand_euler_y,hand_euler_z",
+        numbers: |p| with(place(p, 1.0), turning(p)),
+        map: "euler: {axes: xyz, columns: [hand_euler_x, hand_euler_y, hand_euler_z]}",
+    },
+    Way {
+        names: "hand.x,hand.y,hand.z,hand.q0,hand.q1,hand.q2,hand.q3",
+        numbers: |p| with(place(p, 1.0), scalar_first(p)),
+        map: "quaternion_wxyz: [hand.q0, hand.q1, hand.q2, hand.q3]",
+    },
+    Way {
+        names: "x,y,z,quat_0,quat_1,quat_2,quat_3",
+        numbers: |p| with(place(p, 1.0), scalar_last(p)),
+        map: "quaternion_xyzw: [quat_0, quat_1, quat_2, quat_3]",
+    },
+    Way {
+        names: "/vrpn/hand/pose.position.x,/vrpn/hand/pose.position.y,/vrpn/hand/pose.position.z,/vrpn/hand/pose.orientation.x,/vrpn/hand/pose.orientation.y,/vrpn/hand/pose.orientation.z,/vrpn/hand/pose.orientation.w",
+        numbers: |p| with(place(p, 1.0), scalar_last(p)),
+        map: "vrpn_hand: {position:",
+    },
+    Way {
+        names: "field.transform.translation.x,field.transform.translation.y,field.transform.translation.z,field.transform.rotation.x,field.transform.rotation.y,field.transform.rotation.z,field.transform.rotation.w",
+        numbers: |p| with(place(p, 1.0), scalar_last(p)),
+        map: "quaternion_xyzw: [field.transform.rotation.x, field.transform.rotation.y, field.transform.rotation.z, field.transform.rotation.w]",
+    },
+];
+
+/// Postures of the arm in degrees, and the pose of a body on its last link that a tracker saw.
+fn recorded(n: usize, one_joint_at_a_time: bool, seed: u64) -> Vec<(Vec<f64>, Isometry3<f64>)> {
+    let model = RobotModel::from_urdf_text(&arm(), "arm").expect("an arm");
+    let link = model.link_id("l6").expect("there");
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let tracker_from_root = Isometry3::from_parts(
+        Translation3::new(0.9, 0.3, 0.1),
+        UnitQuaternion::from_euler_angles(0.4, -0.9, 0.7),
+    );
+    let link_from_body = Isometry3::from_parts(
+        Translation3::new(0.03, -0.02, 0.08),
+        UnitQuaternion::from_euler_angles(0.8, 0.3, -1.1),
+    );
+    let mut home = [0.0; 6].map(|_: f64| f64::from(rng.random_range(-60_000_i32..60_000)) / 1e3);
+    let mut rows = Vec::new();
+    for row in 0..n {
+        if one_joint_at_a_time {
+            home[row * 6 / n] = f64::from(rng.random_range(-80_000_i32..80_000)) / 1e3;
+        } else {
+            home = home.map(|_| f64::from(rng.random_range(-80_000_i32..80_000)) / 1e3);
+        }
+        let q: Vec<f64> = home.iter().map(|d| d.to_radians()).collect();
+        let mut noise = |sigma: f64| {
+            Vector3::from_fn(|_, _| {
+                let n: f64 = StandardNormal.sample(&mut rng);
+                sigma * n
+            })
+        };
+        let off = Isometry3::new(noise(NOISE.0), noise(NOISE.1));
+        let seen = tracker_from_root * model.root_from_link(&q, link) * link_from_body * off;
+        rows.push((home.to_vec(), seen));
+    }
+    rows
+}
+
+fn table(way: &Way, rows: &[(Vec<f64>, Isometry3<f64>)]) -> String {
+    let mut text = format!("j1,j2,j3,j4,j5,j6,{}\n", way.names);
+    for (q, pose) in rows {
+        let joints = q.iter().map(|d| format!("{d:.3}"));
+        let numbers = (way.numbers)(pose).into_iter().map(|v| format!("{v:.7}"));
+        let cells: Vec<String> = joints.chain(numbers).collect();
+        text += &cells.join(",");
+        text += "\n";
+    }
+    text
+}
+
+/// 13 notations, each with random postures and with one joint at a time: all are read as they were written, nothing is left to a guess, and the
+/// calibrated robot is as good with each.
+#[test]
+fn orientations_are_read_in_the_notation_that_bodies_follow_the_robot_with() {
+    for sweeps in [false, true] {
+        let (poses, checks) = (recorded(36, sweeps, 5), recorded(12, false, 6));
+        let mut of_all: Option<f64> = None;
+        for way in &WAYS {
+            let dir = Scratch::new()
+                .file("arm.urdf", arm())
+                .file("poses.csv", table(way, &poses))
+                .file("checks.csv", table(way, &checks));
+            let said = dir.calib([
+                "init",
+                "arm.urdf",
+                "poses.csv",
+                "checks.csv",
+                "-o",
+                "arm.yaml",
+            ]);
+            assert_eq!(said.code, 0, "{}{}", said.stdout, said.stderr);
+            let profile = dir.read("arm.yaml");
+            assert!(profile.contains(way.map), "{}: {profile}", way.names);
+            let words = said.words();
+            assert!(!words.contains("the motion does not show"), "{words}");
+            let ran = dir.calib(["run", "arm.yaml", "--out", "out"]);
+            assert!(ran.code < 2, "{}: {}{}", way.names, ran.stdout, ran.stderr);
+            let report = dir.json("out/report.json");
+            let error = report["verification"]["held_out"]["calibrated"]["rms_m"].as_f64();
+            let error = error.expect("checked");
+            assert!(error < 3.0 * NOISE.0, "{}: {error}", way.names);
+            let same = *of_all.get_or_insert(error);
+            assert!(
+                (error - same).abs() < 2e-3 * same,
+                "{}: {error} {same}",
+                way.names
+            );
+        }
+    }
+}
+
+/// A body that stands beside the robot shows no notation: it is read as the others are. Beside markers alone, the usual notation is marked as a guess.
+#[test]
+fn a_body_that_stands_still_is_read_as_the_others_are() {
+    let way = &WAYS[3];
+    let names = |of: &str| way.names.replace("flange", of);
+    let still = Isometry3::from_parts(
+        Translation3::new(0.5, 0.1, 0.2),
+        UnitQuaternion::from_euler_angles(0.5, -0.4, 2.0),
+    );
+    let rows = recorded(30, false, 7);
+    let write = |moving: bool| {
+        let flange = match moving {
+            true => names("flange"),
+            false => "f1.x,f1.y,f1.z,f2.x,f2.y,f2.z,f3.x,f3.y,f3.z".to_owned(),
+        };
+        let mut text = format!("j1,j2,j3,j4,j5,j6,{},{flange}", names("base"));
+        for (row, (q, pose)) in rows.iter().enumerate() {
+            let jitter = Vector3::repeat(1e-4 * (row as f64).sin());
+            let still = still * Translation3::from(jitter);
+            let mut cells: Vec<String> = q.iter().map(|d| format!("{d:.3}")).collect();
+            let markers = [Vector3::zeros(), 0.1 * Vector3::x(), 0.1 * Vector3::y()];
+            let numbers = match moving {
+                true => (way.numbers)(pose),
+                false => {
+                    let seen = markers.map(|at| pose * nalgebra::Point3::from(at));
+                    seen.iter().flat_map(|p| p.coords.data.0[0]).collect()
+                }
+            };
+            let numbers = (way.numbers)(&still).into_iter().chain(numbers);
+            cells.extend(numbers.map(|v| format!("{v:.7}")));
+            text += "\n";
+            text += &cells.join(",");
+        }
+        text + "\n"
+    };
+    let asked = |moving: bool| {
+        let dir = Scratch::new()
+            .file("arm.urdf", arm())
+            .file("poses.csv", write(moving));
+        let said = dir.calib(["init", "arm.urdf", "poses.csv", "-o", "arm.yaml"]);
+        assert_eq!(said.code, 0, "{}{}", said.stdout, said.stderr);
+        (dir.read("arm.yaml"), said.words())
+    };
+    let (profile, words) = asked(true);
+    let both = ["base", "flange"]
+        .map(|of| format!("euler: {{axes: xyz, columns: [{of}.rx, {of}.ry, {of}.rz]}}"));
+    assert!(both.iter().all(|map| profile.contains(map)), "{profile}");
+    assert!(
+        words.contains("as those of the other bodies are"),
+        "{words}"
+    );
+    let (profile, words) = asked(false);
+    assert!(
+        profile.contains("fixed_xyz: [base.rx, base.ry, base.rz]"),
+        "{profile}"
+    );
+    assert!(words.contains("the motion does not show"), "{words}");
+}
+
+/// Names that look like an orientation and are none: markers stay markers, joints stay joints.
+#[test]
+fn what_only_looks_like_an_orientation_is_none() {
+    let rows = recorded(24, false, 8);
+    let mut text = "j1,j2,j3,j4,j5,j6,L_x,L_y,L_z,R_x,R_y,R_z,q_x,q_y,q_z,q_w".to_owned();
+    for (q, pose) in &rows {
+        let mut cells: Vec<String> = q.iter().map(|d| format!("{d:.3}")).collect();
+        for at in [Vector3::new(0.0, 0.1, 0.0), Vector3::new(0.0, -0.1, 0.0)] {
+            let seen = pose * nalgebra::Point3::from(at);
+            cells.extend(seen.iter().map(|v| format!("{v:.7}")));
+        }
+        // Weights of four cells, which have no length of one.
+        cells.extend(["0.3", "0.2", "0.1", "0.9"].map(str::to_owned));
+        text += "\n";
+        text += &cells.join(",");
+    }
+    let dir = Scratch::new()
+        .file("arm.urdf", arm())
+        .file("poses.csv", text + "\n");
+    let said = dir.calib(["init", "arm.urdf", "poses.csv", "-o", "arm.yaml"]);
+    assert_eq!(said.code, 0, "{}{}", said.stdout, said.stderr);
+    let profile = dir.read("arm.yaml");
+    assert!(!profile.contains("pose: true"), "{profile}");
+    assert!(profile.contains("L: [L_x, L_y, L_z]"), "{profile}");
+}
+
+/// Software of cameras often states where the camera is in the frame of the target: the profile says so, and the run is as good.
+#[test]
+fn poses_of_the_tracker_in_the_body_are_inverted() {
+    let header =
+        "j1,j2,j3,j4,j5,j6,target.x,target.y,target.z,target.qx,target.qy,target.qz,target.qw";
+    let write = |rows: &[(Vec<f64>, Isometry3<f64>)]| {
+        let inverse = |(q, pose): &(Vec<f64>, Isometry3<f64>)| (q.clone(), pose.inverse());
+        let rows: Vec<_> = rows.iter().map(inverse).collect();
+        let way = Way {
+            names: header.split_once("j6,").expect("there").1,
+            numbers: |p| with(place(p, 1.0), scalar_last(p)),
+            map: "inverted: true",
+        };
+        table(&way, &rows)
+    };
+    let dir = Scratch::new()
+        .file("arm.urdf", arm())
+        .file("poses.csv", write(&recorded(36, false, 9)))
+        .file("checks.csv", write(&recorded(12, false, 10)));
+    let said = dir.calib([
+        "init",
+        "arm.urdf",
+        "poses.csv",
+        "checks.csv",
+        "-o",
+        "arm.yaml",
+    ]);
+    assert_eq!(said.code, 0, "{}{}", said.stdout, said.stderr);
+    let profile = dir.read("arm.yaml");
+    assert!(profile.contains("inverted: true"), "{profile}");
+    assert!(
+        said.words().contains("those of the tracker in the body"),
+        "{}",
+        said.words()
+    );
+    let ran = dir.calib(["run", "arm.yaml", "--out", "out"]);
+    assert!(ran.code < 2, "{}{}", ran.stdout, ran.stderr);
+    let report = dir.json("out/report.json");
+    let error = report["verification"]["held_out"]["calibrated"]["rms_m"].as_f64();
+    assert!(error.expect("checked") < 3.0 * NOISE.0, "{error:?}");
+}
