@@ -22,6 +22,7 @@ mod few_rows;
 mod fit;
 mod fleet;
 mod fleet_faults;
+mod gains;
 mod gantry;
 mod held_readings;
 mod holds_and_rows;

@@ -35,13 +35,13 @@ const TIP: [[f64; 3]; 4] = [
 ];
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Tip {
+pub enum Tip {
     Markers(usize),
     Pose,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq)]
-enum Design {
+pub enum Design {
     Random,
     /// One joint after the other.
     Sweeps,
@@ -171,14 +171,14 @@ fn table(
     text
 }
 
-/// Findings of `calib check` that are more than information.
-fn named(
+/// A folder with the hand's profile `hand.yaml`, its URDF and recordings.
+pub fn hand(
     tip: Tip,
     design: Design,
     wrong: &[(&str, &str)],
     moves: &dyn Fn(&mut [f64]),
     seed: u64,
-) -> Vec<Value> {
+) -> Scratch {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let robot = urdf(Some(ChaCha8Rng::seed_from_u64(seed + 100)), &[]);
     let robot = RobotModel::from_urdf_text(&robot, "hand").expect("a hand");
@@ -195,7 +195,7 @@ fn named(
         Tip::Pose => format!("t_{finger}: {{link: {finger}_mid_link, pose: true}}"),
     };
     let bodies = FINGERS.map(body).join("\n  ");
-    let dir = Scratch::new()
+    Scratch::new()
         .file("hand.urdf", urdf(None, wrong))
         .file("poses.csv", table(&robot, tip, &poses, moves, &mut rng))
         .file("checks.csv", table(&robot, tip, &checks, moves, &mut rng))
@@ -206,7 +206,18 @@ fn named(
                  {bodies}\nrecordings:\n  poses: {{file: poses.csv, use: static}}\n  checks: {{file: checks.csv, use: validation}}\n\
                  solve:\n  free: [bodies, tracker, joint_offsets, joint_axes]\n"
             ),
-        );
+        )
+}
+
+/// Findings of `calib check` that are more than information.
+fn named(
+    tip: Tip,
+    design: Design,
+    wrong: &[(&str, &str)],
+    moves: &dyn Fn(&mut [f64]),
+    seed: u64,
+) -> Vec<Value> {
+    let dir = hand(tip, design, wrong, moves, seed);
     let ran = dir.calib(["check", "hand.yaml", "--json"]);
     let report: Value = serde_json::from_str(&ran.stdout).expect("JSON");
     let all = report["findings"].as_array().expect("a list").iter();

@@ -161,7 +161,9 @@ fn share(tested: &[&Tested], c: f64, critical: f64, one_sided: bool) -> f64 {
         let z2 = (shifted * t.per_sigma).powi(2) / (1.0 + added);
         let explains = added / (1.0 + added);
         let possible = !one_sided || shifted >= 0.0;
-        z2 > critical && explains > GoodnessOfFit::RELEVANT && possible
+        let moves = shifted * shifted * t.moves;
+        let relevant = explains > GoodnessOfFit::RELEVANT || moves > GoodnessOfFit::MOVES;
+        z2 > critical && relevant && possible
     };
     let of = |c: f64| tested.iter().filter(|t| is_found(t, c)).count() as f64;
     let n = tested.len() as f64;
@@ -268,6 +270,7 @@ mod tests {
             estimate: sigma * rng.sample::<f64, _>(StandardNormal),
             per_sigma: 1.0 / sigma,
             explains: 1.0 / (sigma * sigma * rows),
+            moves: 0.0,
         };
         (0..trials).map(one).collect()
     }

@@ -53,6 +53,9 @@ pub struct Tested {
     pub per_sigma: f64,
     /// Share of χ² that the effect would remove over ĉ².
     pub explains: f64,
+    /// Mean square of what the effect moves, in units of the noise, over ĉ².
+    #[serde(default)]
+    pub moves: f64,
 }
 
 /// A trial with something wrong.
@@ -179,6 +182,7 @@ fn tests(causes: &Causes) -> Vec<Tested> {
             estimate: t.estimate,
             per_sigma: t.z2.sqrt() / estimate,
             explains: t.explains / (estimate * estimate),
+            moves: t.moves / (estimate * estimate),
         })
     };
     let mut all: Vec<Tested> = of_joints.filter_map(of).collect();

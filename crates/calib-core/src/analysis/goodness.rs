@@ -67,6 +67,9 @@ pub struct ScoreTest {
     pub p_corrected: f64,
     /// Share of χ² that the effect would remove.
     pub explains: f64,
+    /// Mean square of what the estimate moves the measurements by that it moves at all, in units of their noise, before the parameters
+    /// adapt to it.
+    pub moves: f64,
 }
 
 impl ScoreTest {
@@ -78,8 +81,13 @@ impl ScoreTest {
 
     /// Whether the model lacks the effect: significant, relevant and possible.
     fn is_missing(&self) -> bool {
-        let counts = self.is_significant() && self.explains > GoodnessOfFit::RELEVANT;
-        counts && self.is_possible()
+        self.is_significant() && self.is_relevant() && self.is_possible()
+    }
+
+    /// Whether it matters: by what it leaves, or by what the parameters took up of it. Of the gain of one joint of a hand the geometry
+    /// takes up nearly all, and what is left is a small share of the χ² of all fingers; the geometry is then off by far more than its σ.
+    fn is_relevant(&self) -> bool {
+        self.explains > GoodnessOfFit::RELEVANT || self.moves > GoodnessOfFit::MOVES
     }
 
     /// Physics allows a coefficient of this sign.
@@ -108,8 +116,10 @@ pub struct GoodnessOfFit {
 impl GoodnessOfFit {
     /// An effect counts as missing when chance would show one as large in less than 1 of 1000 analyses…
     pub const SIGNIFICANT: f64 = 1e-3;
-    /// …and when it explains this share of χ²: smaller ones are real but do not matter.
+    /// …and when it explains this share of χ²: smaller ones are real but do not matter…
     pub const RELEVANT: f64 = 0.02;
+    /// …unless they move what they move by more than half its noise (mean square): the parameters then took up most of it.
+    pub const MOVES: f64 = 0.25;
 }
 
 /// Numbers of whitened rows that are kept for a second look: 32 MB.
@@ -216,6 +226,12 @@ impl Solution {
             let p_value = (profile.p_value * SAFE).min(1.0);
             let same = |t: &&mut ScoreTest| t.name == candidate.name && t.p_value > p_value;
             if let Some(test) = tests.iter_mut().find(same) {
+                let times = profile.estimate / test.estimate;
+                test.moves *= if times.is_finite() {
+                    times * times
+                } else {
+                    1.0
+                };
                 test.estimate = profile.estimate;
                 test.z2 = profile.t2;
                 test.p_value = p_value;
@@ -240,7 +256,7 @@ impl Solution {
         let model = &self.model;
         let (n, count) = (model.free(), candidates.len());
         let mut u = DVector::zeros(count);
-        let mut raw = vec![0.0; count];
+        let (mut raw, mut moved) = (vec![0.0; count], vec![0_usize; count]);
         let mut b = DMatrix::zeros(n, count);
         let (mut h, mut g) = (DMatrix::zeros(n, n), DVector::zeros(n));
         let samples = &looked_at.samples;
@@ -252,6 +268,7 @@ impl Solution {
             for (k, own) in alpha.column_iter().enumerate() {
                 u[k] += own.dot(&s.w);
                 raw[k] += own.norm_squared();
+                moved[k] += own.iter().filter(|by| **by != 0.0).count();
             }
             s.a.add_transposed_times(1.0, alpha, &mut b);
             if !looked_at.all {
@@ -325,6 +342,7 @@ impl Solution {
                 p_value: tested.p_value,
                 p_corrected: (tested.p_value * tried).min(1.0),
                 explains: (u[k] * u[k] / information / chi2.max(1e-300)).min(1.0),
+                moves: estimates[k].powi(2) * raw[k] / moved[k].max(1) as f64,
             });
         }
         Some(out)

@@ -19,6 +19,7 @@ use crate::output::evidence::{Evidence, fit_end};
 use crate::output::of_fit::{stated_sigma, unit};
 use crate::output::open;
 use crate::verify::accuracy::{ToolBody, tool_bodies};
+use crate::verify::agreement::agreement;
 use crate::verify::motions::Motions;
 use crate::verify::tracker_noise::recording_of;
 
@@ -78,7 +79,8 @@ pub(crate) fn facts(
         agreement: e
             .fit
             .filter(|_| !left_out)
-            .and_then(|fit| open::agreement(e.inputs, fit, held_out)),
+            .and_then(|fit| agreement(e.inputs, fit, held_out))
+            .map(|(agreement, _)| agreement),
     }
 }
 

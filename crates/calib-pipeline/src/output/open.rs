@@ -16,24 +16,22 @@
 //! | step of the tracker or of a body | 1 mm along each axis | a touch that nobody noticed |
 //! | a change that was found and not split | as found | it is in the data |
 
-use std::collections::BTreeSet;
-
 use calib_core::{
     Change, EffectKind, FrameId, JointState, Moved, MovedPoint, Moves, OpenCause, OpenError,
     Target, UntestedEffect,
 };
 use calib_profile::Usage;
-use calib_report::{Agreement, HeldOut, Predicted, Prediction, Untested, UntestedKind};
+use calib_report::{HeldOut, Predicted, Prediction, Untested, UntestedKind};
 use calib_urdf::{JointId, RobotModel};
 
 use crate::formulate::formulation::MlFit;
 use crate::formulate::kinematics::joint_state;
-use crate::formulate::row_levels::HeldOutLevels;
 use crate::output::weak::{postures, tool};
 use crate::prepare::conditions::Conditions;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::loads::Loads;
 use crate::verify::accuracy::configuration;
+use crate::verify::agreement::screened;
 use crate::verify::changes::name_of;
 
 /// Samples that the design is taken from, at most: more change nothing but the time.
@@ -133,42 +131,6 @@ fn predicted(error: &OpenError) -> Predicted {
         rms: error.rms,
         upper: error.upper,
     }
-}
-
-/// Held-out errors, the screened ones left out, against what the fit states of them.
-pub(crate) fn agreement(
-    inputs: &Inputs,
-    fit: &MlFit,
-    held_out: Option<&HeldOut>,
-) -> Option<Agreement> {
-    let without = screened(inputs, fit, held_out);
-    let samples = &fit.formulation.samples;
-    let rows = HeldOutLevels::of(inputs, samples);
-    let recording = |sample: usize| &inputs.recordings[&samples[sample].0];
-    let level = |sample, kind, found| rows.level(recording(sample), kind, found);
-    let (chi2, rows) = fit.solution.held_out_chi2(&without, &level)?;
-    let freedom = fit.solution.degrees_of_freedom;
-    Some(Agreement::of(chi2, rows, freedom))
-}
-
-/// Samples with a held-out error that was screened out.
-fn screened(inputs: &Inputs, fit: &MlFit, held_out: Option<&HeldOut>) -> BTreeSet<usize> {
-    let errors = held_out
-        .iter()
-        .filter(|h| !h.left_out)
-        .flat_map(|h| &h.poses);
-    let gross: BTreeSet<&String> = errors.filter(|p| p.screened).map(|p| &p.pose).collect();
-    let of = |(recording, row): &(String, usize)| {
-        format!(
-            "{recording}:{}",
-            inputs.recordings[recording].poses.rows[*row]
-        )
-    };
-    let samples = fit.formulation.samples.iter().enumerate();
-    samples
-        .filter(|(_, sample)| gross.contains(&of(sample)))
-        .map(|(s, _)| s)
-        .collect()
 }
 
 /// All samples but those: fitted ones first, each in the order of the recording.

@@ -7,7 +7,7 @@ use crate::formulate::checked::Checked;
 use crate::formulate::completed::of_tests;
 use crate::formulate::formulation::{FreeSet, MlFit};
 use crate::formulate::ml;
-use crate::formulate::parts::with_parts;
+use crate::formulate::parts::{RobotPart, with_parts};
 use crate::formulate::starts;
 use crate::prepare::inputs::Inputs;
 use crate::verify::Verified;
@@ -16,7 +16,9 @@ use crate::verify::moved::moved;
 /// The motions before held-out recordings that are found with the missing effects free as well; all of them where the effects cannot be freed.
 pub(super) fn still_moved(inputs: &Inputs, checked: &Checked, verified: &Verified) -> Vec<Finding> {
     let all = || verified.findings.clone();
-    let Some((inputs, fit)) = with_missing(inputs, checked, verified) else {
+    let missing = verified.causes.goodness.as_ref().map(|g| &g.missing);
+    let parts = missing.map_or_else(Vec::new, |missing| of_tests(inputs, missing));
+    let Some((inputs, fit)) = with_free(inputs, checked, &parts) else {
         return all();
     };
     let again = moved(&inputs, &checked.tracks, &fit.calibration, Some(&fit));
@@ -27,19 +29,18 @@ pub(super) fn still_moved(inputs: &Inputs, checked: &Checked, verified: &Verifie
     all().into_iter().filter(found).collect()
 }
 
-/// The fit with the missing effects free.
-fn with_missing(
-    inputs: &Inputs,
-    checked: &Checked,
-    verified: &Verified,
-) -> Option<(Inputs, MlFit)> {
-    let missing = &verified.causes.goodness.as_ref()?.missing;
-    let parts = of_tests(inputs, missing);
+/// The fit with these parts free as well; `None` without any.
+fn with_free(inputs: &Inputs, checked: &Checked, parts: &[RobotPart]) -> Option<(Inputs, MlFit)> {
     if parts.is_empty() {
         return None;
     }
     let mut inputs = inputs.clone();
-    inputs.robot.profile.solve = with_parts(&inputs, &parts);
+    inputs.robot.profile.solve = with_parts(&inputs, parts);
+    again(inputs, checked)
+}
+
+/// The fit of other inputs, as the profile states it.
+pub(super) fn again(mut inputs: Inputs, checked: &Checked) -> Option<(Inputs, MlFit)> {
     let mut settings = Settings::default();
     settings.robust.enabled = inputs.robot.profile.solve.robust;
     let fit = |inputs: &Inputs| {

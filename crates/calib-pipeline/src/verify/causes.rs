@@ -193,11 +193,15 @@ fn asked(
                 linearized: change.map_or(0.0, |(change, _)| turned(change).powi(2)),
             }
         }
-        Cause::Missing(_) => Asked {
+        Cause::Missing(test) => Asked {
             least: contest
                 .threshold(SIGNIFICANT / tests as f64, directions)
                 .min(KEPT * alone),
-            share: RELEVANT,
+            // What counts for what the parameters took up of it leaves less than others.
+            share: match test.explains > RELEVANT {
+                true => RELEVANT,
+                false => 0.5 * test.explains,
+            },
             part: ALIKE,
             linearized: 0.0,
         },

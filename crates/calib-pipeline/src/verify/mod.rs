@@ -1,6 +1,7 @@
 //! What a solution is worth: held-out errors, loops, residuals, accuracy over the workspace.
 
 pub mod accuracy;
+pub(crate) mod agreement;
 mod applied;
 pub mod causes;
 pub mod changes;
@@ -8,6 +9,7 @@ pub mod closure;
 pub mod deviations;
 pub(crate) mod dh_table;
 mod elimination;
+mod gains;
 pub mod hayati;
 pub mod held_out;
 pub mod information;
@@ -101,6 +103,8 @@ pub fn verified(
     // Beside missing physics, what a joint does is that.
     let scatter = verified.causes.scatter.clone().filter(|_| !missing);
     verified.findings.extend(scatter);
+    let gain = fit.and_then(|fit| gains::of_held_out(inputs, checked, fit, &verified));
+    verified.findings.extend(gain);
     if let Some(changed) = verified.causes.change.clone() {
         verified.findings = one_cause(changed, verified.findings);
     }

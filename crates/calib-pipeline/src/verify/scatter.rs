@@ -124,8 +124,10 @@ fn in_stops(
         let Some(left) = found.left.get(k) else {
             return false;
         };
-        let explains = goodness.missing.get(k).map_or(1.0, |test| test.explains);
-        left.part > OWN && left.is_significant(chance) && explains * left.part > RELEVANT
+        let matters = goodness.missing.get(k).is_none_or(|test| {
+            test.explains * left.part > RELEVANT || test.moves * left.part > GoodnessOfFit::MOVES
+        });
+        left.part > OWN && left.is_significant(chance) && matters
     };
     Some((finding, (0..suspects.len()).map(holds).collect()))
 }
