@@ -127,7 +127,12 @@ fn shown(inputs: &Inputs, fit: &MlFit, held_out: &HeldOut, above: f64) -> Option
         (!modeled).then(|| (joint, OpenCause::Effects(vec![effect])))
     };
     let joints = open_joints(inputs, &fit.formulation).into_iter();
-    let joints = joints.filter(|joint| model.joint(*joint).kind != JointKind::Fixed);
+    // With a joint that others follow, these move as well: the size by its own motion would be another one.
+    let leads = |joint: &JointId| {
+        let mut mimics = model.joints().iter().filter_map(|j| j.mimic.as_ref());
+        mimics.any(|mimic| mimic.joint == *joint)
+    };
+    let joints = joints.filter(|j| model.joint(*j).kind != JointKind::Fixed && !leads(j));
     let (joints, causes): (Vec<JointId>, Vec<OpenCause<'_>>) = joints.filter_map(gain).unzip();
     let point = vec![any_point(inputs, fit, rows.first()?)?];
     let found = fit
