@@ -102,7 +102,27 @@ fn scalar_first(pose: &Isometry3<f64>) -> Vec<f64> {
 }
 
 /// What cameras, controllers and loggers write.
-const WAYS: [Way; 13] = [
+const WAYS: [Way; 17] = [
+    Way {
+        names: "Q0,Qx,Qy,Qz,Tx,Ty,Tz",
+        numbers: |p| with(scalar_first(p), place(p, 1e3)),
+        map: "quaternion_xyzw: [Qx, Qy, Qz, Q0]",
+    },
+    Way {
+        names: "hand_x_mm,hand_y_mm,hand_z_mm,hand_rotx_deg,hand_roty_deg,hand_rotz_deg",
+        numbers: |p| with(place(p, 1e3), degrees(turning(p))),
+        map: "euler: {axes: xyz, columns: [hand_rotx_deg, hand_roty_deg, hand_rotz_deg]}",
+    },
+    Way {
+        names: "x,y,z,alpha,beta,gamma",
+        numbers: |p| with(place(p, 1.0), zyz(p)),
+        map: "euler: {axes: zyz, columns: [alpha, beta, gamma]}",
+    },
+    Way {
+        names: "x,y,z,omega,phi,kappa",
+        numbers: |p| with(place(p, 1.0), degrees(turning(p))),
+        map: "euler: {axes: xyz, columns: [omega, phi, kappa]}",
+    },
     Way {
         names: "tvec_x,tvec_y,tvec_z,rvec_x,rvec_y,rvec_z",
         numbers: |p| with(place(p, 1.0), vector(p)),
@@ -220,7 +240,7 @@ fn table(way: &Way, rows: &[(Vec<f64>, Isometry3<f64>)]) -> String {
     text
 }
 
-/// 13 notations, each with random postures and with one joint at a time: all are read as they were written, nothing is left to a guess, and the
+/// 17 notations, each with random postures and with one joint at a time: all are read as they were written, nothing is left to a guess, and the
 /// calibrated robot is as good with each.
 #[test]
 fn orientations_are_read_in_the_notation_that_bodies_follow_the_robot_with() {
@@ -264,7 +284,7 @@ fn orientations_are_read_in_the_notation_that_bodies_follow_the_robot_with() {
 /// A body that stands beside the robot shows no notation: it is read as the others are. Beside markers alone, the usual notation is marked as a guess.
 #[test]
 fn a_body_that_stands_still_is_read_as_the_others_are() {
-    let way = &WAYS[3];
+    let way = &WAYS[7];
     let names = |of: &str| way.names.replace("flange", of);
     let still = Isometry3::from_parts(
         Translation3::new(0.5, 0.1, 0.2),
@@ -386,4 +406,28 @@ fn poses_of_the_tracker_in_the_body_are_inverted() {
     let report = dir.json("out/report.json");
     let error = report["verification"]["held_out"]["calibrated"]["rms_m"].as_f64();
     assert!(error.expect("checked") < 3.0 * NOISE.0, "{error:?}");
+}
+
+/// The joints of a head are called as the angles of a body are: the columns that are not used are said to be called as joints.
+#[test]
+fn columns_of_joints_that_are_not_used_are_to_be_checked() {
+    let head = arm()
+        .replace("\"j1\"", "\"yaw\"")
+        .replace("\"j2\"", "\"pitch\"");
+    let head = head.replace("\"j3\"", "\"roll\"");
+    let rows = recorded(20, false, 11);
+    let mut text = "q1,q2,q3,q4,q5,q6,x,y,z,roll,pitch,yaw".to_owned();
+    for (q, pose) in &rows {
+        let cells = q.iter().map(|d| format!("{:.5}", d.to_radians()));
+        let numbers = with(place(pose, 1.0), fixed(pose)).into_iter();
+        let cells: Vec<String> = cells.chain(numbers.map(|v| format!("{v:.6}"))).collect();
+        text += "\n";
+        text += &cells.join(",");
+    }
+    let dir = Scratch::new()
+        .file("arm.urdf", head)
+        .file("poses.csv", text + "\n");
+    let said = dir.calib(["init", "arm.urdf", "poses.csv", "-o", "arm.yaml"]);
+    let words = said.words() + &said.stderr;
+    assert!(words.contains("are called as joints are"), "{words}");
 }

@@ -43,8 +43,21 @@ pub fn guess(model: &RobotModel, header: &Header) -> Guess {
     let ignored: Vec<String> = ignored.map(|i| header.names[i].clone()).collect();
     if !ignored.is_empty() {
         let time = guess.map.time.is_none();
+        let of_joint = |column: &&String| {
+            let numbers = header
+                .position(column)
+                .is_some_and(|i| header.has_numbers(i));
+            let stem = name::unit(column).stem;
+            numbers && name::numbered(stem).is_some() && name::is_of_joints(stem)
+        };
+        let alike: Vec<String> = ignored.iter().filter(of_joint).cloned().collect();
         guess.facts.push(About::Ignored {
-            orientation: unread::orientation(header, &ignored),
+            // A body that has one is no point without them.
+            orientation: match guess.map.bodies.is_empty() {
+                true => unread::orientation(header, &ignored),
+                false => Vec::new(),
+            },
+            joints: if alike.len() > 1 { alike } else { Vec::new() },
             times: time.then(|| unread::times(header, &ignored)).flatten(),
             parts: time.then(|| unread::parts(header)).flatten(),
             columns: ignored,

@@ -204,6 +204,8 @@ pub enum About {
         columns: Vec<String>,
         /// Those that seem to be an orientation.
         orientation: Vec<String>,
+        /// Those that are called as joints are.
+        joints: Vec<String>,
         /// The one that seems to hold times as text.
         times: Option<String>,
         /// Those that hold whole seconds and the parts of a second.

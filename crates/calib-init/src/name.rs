@@ -225,7 +225,18 @@ pub fn is_of_joints(name: &str) -> bool {
 }
 
 /// Words of columns that are about joints, but hold no position, or not the one that was reached.
-const OTHERS: [&str; 28] = [
+const OTHERS: [&str; 39] = [
+    "gravity",
+    "gyro",
+    "magnetometer",
+    "mag",
+    "imu",
+    "accel",
+    "std",
+    "stddev",
+    "sigma",
+    "err",
+    "nm",
     "vel",
     "velocity",
     "speed",

@@ -101,6 +101,10 @@ enum Set {
     Wpr,
     /// `o`, `a`, `t` of a Kawasaki controller: about z, y, z.
     Oat,
+    /// Greek letters in the order in which they are written: about x, y, z, or about z first.
+    Greek,
+    /// `omega`, `phi`, `kappa` of photogrammetry: about x, the new y and the new z.
+    Omega,
 }
 
 /// What a column is of, by its name: what the columns of one thing have in common, its set or a position, and its place in it.
@@ -113,9 +117,12 @@ struct Part {
 /// Words before the letter or number of a position.
 const PLACES: [&str; 6] = ["position", "pos", "translation", "trans", "tvec", "xyz"];
 /// Words before the letter or number of an orientation.
-const TURNS: [&str; 7] = [
+const TURNS: [&str; 10] = [
     "orientation",
     "orient",
+    "ori",
+    "attitude",
+    "att",
     "rotation",
     "rot",
     "quaternion",
@@ -123,7 +130,7 @@ const TURNS: [&str; 7] = [
     "q",
 ];
 /// Words before the letter of an angle.
-const ANGLES: [&str; 5] = ["euler", "rpy", "angle", "angles", "eul"];
+const ANGLES: [&str; 7] = ["euler", "eul", "rpy", "angle", "angles", "ang", "theta"];
 /// Words before the letter or number of a rotation vector.
 const VECTORS: [&str; 5] = ["rvec", "rotvec", "rodrigues", "rotationvector", "rotvector"];
 /// Words that say of a body that it has a pose.
@@ -144,6 +151,10 @@ impl Part {
         let count = words.len();
         let before = words.last().map_or("", String::as_str);
         if let Ok(number) = last.parse::<usize>() {
+            // `q0` beside `qx`, `qy` and `qz`.
+            if number == 0 && before == "q" {
+                add(count, "", Some(Set::Quaternion), 3);
+            }
             if matches!(before, "q" | "quat" | "quaternion" | "orientation") {
                 add(count, "", Some(Set::Numbered), number);
             } else if VECTORS.contains(&before) {
@@ -152,13 +163,15 @@ impl Part {
                 add(count, "", None, number);
             }
             // `rx1` is of the first body.
-            if let Some((letter, words)) = words.split_last()
-                && let Some((set, at)) = of_letter(letter, words)
-            {
-                add(words.len(), last, set, at);
+            if let Some((letter, words)) = words.split_last() {
+                for (set, at) in of_letter(letter, words) {
+                    add(words.len(), last, set, at);
+                }
             }
-        } else if let Some((set, at)) = of_letter(last, words) {
-            add(count, "", set, at);
+        } else {
+            for (set, at) in of_letter(last, words) {
+                add(count, "", set, at);
+            }
         }
         found
     }
@@ -191,46 +204,46 @@ fn of_words(stem: &str, words: &[String], behind: &str) -> String {
     }
 }
 
-/// What a letter, or a word of letters, says behind these words.
-fn of_letter(last: &str, words: &[String]) -> Option<(Option<Set>, usize)> {
+/// What a letter, or a word of letters, may say behind these words.
+fn of_letter(last: &str, words: &[String]) -> Vec<(Option<Set>, usize)> {
     let before = words.last().map_or("", String::as_str);
     let of = |letters: &[&str]| letters.iter().position(|letter| *letter == last);
-    if let Some(at) = of(&["qx", "qy", "qz", "qw"]) {
-        return Some((Some(Set::Quaternion), at));
-    }
-    if let Some(at) = of(&["rx", "ry", "rz"]) {
-        return Some((Some(Set::AboutAxes), at));
-    }
-    if let Some(at) = of(&["roll", "pitch", "yaw"]) {
-        return Some((Some(Set::Angles), at));
-    }
-    if let Some(at) = of(&["tx", "ty", "tz"]).or_else(|| of(&["px", "py", "pz"])) {
-        return Some((None, at));
-    }
     if let Some(at) = of(&["x", "y", "z", "w"]) {
-        let vector =
-            VECTORS.contains(&before) || words.ends_with(&["rotation".into(), "vector".into()]);
+        let pairs = [["rotation", "vector"], ["rot", "vec"], ["axis", "angle"]];
+        let vector = pairs
+            .iter()
+            .any(|pair| words.ends_with(&pair.map(str::to_owned)));
         let set = match before {
-            _ if vector && at < 3 => Some(Set::Vector),
+            _ if (vector || VECTORS.contains(&before)) && at < 3 => Some(Set::Vector),
             word if TURNS.contains(&word) && at < 3 => Some(Set::AboutAxes),
             word if TURNS.contains(&word) => Some(Set::Quaternion),
             word if ANGLES.contains(&word) && at < 3 => Some(Set::Angles),
             _ => None,
         };
         if at < 3 || set.is_some() {
-            return Some((set, at));
+            return vec![(set, at)];
         }
     }
-    let sets = [
-        (Set::Abc, ["a", "b", "c"]),
-        (Set::Wpr, ["w", "p", "r"]),
-        (Set::Oat, ["o", "a", "t"]),
+    const SETS: [(Option<Set>, &[&str]); 14] = [
+        (Some(Set::Quaternion), &["qx", "qy", "qz", "qw"]),
+        (Some(Set::AboutAxes), &["rx", "ry", "rz"]),
+        (Some(Set::AboutAxes), &["rotx", "roty", "rotz"]),
+        (Some(Set::Angles), &["ex", "ey", "ez"]),
+        (Some(Set::Angles), &["roll", "pitch", "yaw"]),
+        (Some(Set::Angles), &["", "", "heading"]),
+        (Some(Set::Greek), &["phi", "theta", "psi"]),
+        (Some(Set::Greek), &["alpha", "beta", "gamma"]),
+        (Some(Set::Omega), &["omega", "phi", "kappa"]),
+        (Some(Set::Abc), &["a", "b", "c"]),
+        (Some(Set::Wpr), &["w", "p", "r"]),
+        (Some(Set::Oat), &["o", "a", "t"]),
+        (None, &["tx", "ty", "tz"]),
+        (None, &["px", "py", "pz"]),
     ];
-    // A letter alone, or the last of a name, which stands in one set or in two.
-    let found = sets
-        .into_iter()
-        .find_map(|(set, letters)| Some((set, of(&letters)?)))?;
-    Some((Some(found.0), found.1))
+    // A letter may stand in several sets.
+    let sets = SETS.into_iter();
+    sets.filter_map(|(set, letters)| Some((set, of(letters)?)))
+        .collect()
 }
 
 /// Positions with an orientation beside them in another notation than `qx` to `qw`.
@@ -258,12 +271,6 @@ fn other_notations(header: &Header, guess: &mut Guess, used: &mut BTreeSet<usize
             }
             .entry(part.at)
             .or_insert(i);
-            // `a` is of two sets.
-            if part.set == Some(Set::Abc) && part.at == 0 {
-                let of = Part::all(unit.stem).remove(0).of;
-                let oat = turns.entry(of).or_default().entry(Set::Oat).or_default();
-                oat.entry(1).or_insert(i);
-            }
         }
     }
     for (of, place) in places {
@@ -346,7 +353,17 @@ fn orientation(
         let columns = in_order::<3>(columns)?;
         let degrees = unit_of(header, &columns).1 == AngleUnit::Deg;
         let of: [String; 3] = names(&columns).try_into().ok()?;
-        Some((columns.to_vec(), ways(*set, &of, degrees)))
+        // One way twice would seem to be two that the motion does not distinguish.
+        let mut distinct: Vec<BodyColumns> = Vec::new();
+        for way in ways(*set, &of, degrees) {
+            if distinct
+                .iter()
+                .all(|d| Notation::of(d) != Notation::of(&way))
+            {
+                distinct.push(way);
+            }
+        }
+        Some((columns.to_vec(), distinct))
     })
 }
 
@@ -397,11 +414,18 @@ fn ways(set: Set, columns: &[String; 3], degrees: bool) -> Vec<BodyColumns> {
         Set::Vector => vec![vector],
         Set::AboutAxes if degrees => orders().chain([vector]).collect(),
         Set::AboutAxes => std::iter::once(vector).chain(orders()).collect(),
-        Set::Angles | Set::Wpr => orders().collect(),
+        Set::Angles | Set::Wpr => orders().chain([vector]).collect(),
         Set::Abc => written(EulerAxes::Zyx).chain(orders()).collect(),
         Set::Oat => written(EulerAxes::Zyz)
             .chain(written(EulerAxes::Zyx))
             .collect(),
+        Set::Omega => written(EulerAxes::Xyz).chain(orders()).collect(),
+        Set::Greek => {
+            let others = [EulerAxes::Zyx, EulerAxes::Zyz, EulerAxes::Zxz];
+            orders()
+                .chain(others.into_iter().flat_map(written))
+                .collect()
+        }
     }
 }
 

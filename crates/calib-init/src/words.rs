@@ -301,6 +301,7 @@ fn ignored(about: &About) -> String {
     let About::Ignored {
         columns,
         orientation,
+        joints,
         times,
         parts,
     } = about
@@ -312,6 +313,12 @@ fn ignored(about: &About) -> String {
         text += &format!(
             " {} seem to be an orientation: without it the body is a point. Write it as a quaternion, `<body>.qx` to `<body>.qw`, or map its columns.",
             quoted(orientation)
+        );
+    }
+    if !joints.is_empty() {
+        text += &format!(
+            " {} are called as joints are: if they are the robot's, say so in the column map, and look at which columns are read as joints now.",
+            quoted(joints)
         );
     }
     if let Some(times) = times {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use calib_finding::{Fact, Finding, Subject, Unit, catalog};
-use nalgebra::Point3;
+use nalgebra::{Isometry3, Point3};
 
 use crate::model::{Filled, MarkerSample};
 
@@ -58,6 +58,29 @@ fn stands_for_nothing(value: f64, markers: &[Vec<MarkerSample>]) -> bool {
         near |= (point - code).norm() < NEAR;
     }
     any && !near
+}
+
+/// Takes poses at the origin without a rotation for lost, where the other poses of the body are elsewhere: what loggers write before the first message
+/// and after the last. The rows of what was taken.
+pub(crate) fn without_identities(track: &mut [Option<Isometry3<f64>>], rows: &[u64]) -> Vec<u64> {
+    let nothing = Isometry3::identity();
+    let mut others = track
+        .iter()
+        .flatten()
+        .filter(|pose| **pose != nothing)
+        .peekable();
+    let any = others.peek().is_some();
+    if !any || others.any(|pose| pose.translation.vector.norm() < NEAR) {
+        return Vec::new();
+    }
+    let mut taken = Vec::new();
+    for (pose, row) in track.iter_mut().zip(rows) {
+        if *pose == Some(nothing) {
+            *pose = None;
+            taken.push(*row);
+        }
+    }
+    taken
 }
 
 /// The number that all three coordinates of a sample are; 0 is another rule's.

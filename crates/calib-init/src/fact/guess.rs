@@ -36,10 +36,14 @@ pub(super) fn is_guess(about: &About) -> bool {
         About::Turns { how, .. } => *how == TurnsHow::Assumed,
         About::Ignored {
             orientation,
+            joints,
             times,
             parts,
             ..
-        } => times.is_some() || parts.is_some() || !orientation.is_empty(),
+        } => {
+            let unused = [orientation, joints];
+            times.is_some() || parts.is_some() || unused.iter().any(|names| !names.is_empty())
+        }
         About::Log { named, rows, .. } => !named || rows.is_some(),
         About::TipOfChain { .. }
         | About::LinkUnknown { .. }

@@ -72,6 +72,35 @@ fn angles_about_turning_axes_are_read_as_they_say() {
     assert!(back.translation.vector.norm() < 1e-12 && back.rotation.angle() < 1e-12);
 }
 
+/// Zeros, and zeros with the quaternion of no rotation, are lost poses in any notation; a reference that stays at the origin is none.
+#[test]
+fn poses_of_nothing_are_lost() {
+    let read = |text: &str, map_of: Option<&str>| {
+        let options = ReadOptions {
+            columns: map_of.map(map),
+            ..ReadOptions::default()
+        };
+        let read = read_bytes("t.csv", text.as_bytes(), &options);
+        let read = read.unwrap_or_else(|e| panic!("{e}"));
+        let found = read.meta.findings.iter().map(|f| f.rows.clone());
+        let found: Vec<Vec<u64>> = found.collect();
+        (read.poses(Filled::Exclude).expect("one table"), found)
+    };
+    let euler = r#"{"bodies": {"b": {"position": ["x", "y", "z"], "fixed_xyz": ["r", "p", "w"]}}, "joint_columns": ["j"]}"#;
+    let (poses, found) = read(
+        "j,x,y,z,r,p,w\n0,1,2,3,0.1,0.2,0.3\n1,0,0,0,0,0,0\n2,1,2,4,0,0,0\n",
+        Some(euler),
+    );
+    let seen: Vec<bool> = poses.bodies["b"].iter().map(Option::is_some).collect();
+    assert_eq!((seen, found), (vec![true, false, true], vec![vec![3]]));
+    let own = "j_rad,b.x_m,b.y_m,b.z_m,b.qx,b.qy,b.qz,b.qw\n";
+    let (poses, found) = read(&format!("{own}0,1,2,3,0,0,0,1\n1,0,0,0,0,0,0,1\n"), None);
+    assert!(poses.bodies["b"][0].is_some() && poses.bodies["b"][1].is_none());
+    assert_eq!(found, [[3]]);
+    let (poses, found) = read(&format!("{own}0,0,0,0,0,0,0,1\n1,0,0,0,0,0,0,1\n"), None);
+    assert!(poses.bodies["b"].iter().all(Option::is_some) && found.is_empty());
+}
+
 #[test]
 fn a_map_reads_back_what_was_written_for_it() {
     let poses = poses();

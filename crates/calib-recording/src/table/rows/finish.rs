@@ -6,7 +6,7 @@ use crate::model::{
     BodyStream, JointStream, MarkerSample, MarkerStream, Meta, Recording, TemperatureStream,
     TorqueStream,
 };
-use crate::placeholder::{equal, repeated, repeated_finding};
+use crate::placeholder::{equal, repeated, repeated_finding, without_identities};
 use calib_finding::{Fact, Finding, Subject, catalog};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -76,6 +76,14 @@ impl Rows<'_> {
                 }
                 if !rows.is_empty() {
                     findings.push(repeated_finding(name, *code, rows));
+                }
+            }
+        }
+        if !self.map.is_some_and(|map| map.zero_is_a_point) {
+            for (name, track) in body_names.iter().zip(&mut self.bodies) {
+                let rows = without_identities(track, &self.timeline.rows);
+                if !rows.is_empty() {
+                    findings.push(all_zero(name, rows));
                 }
             }
         }
@@ -150,17 +158,20 @@ impl Rows<'_> {
     fn findings(&mut self) -> Vec<Finding> {
         let zeros = std::mem::take(&mut self.zeros)
             .into_iter()
-            .map(|(name, rows)| {
-                Finding::of_kind(catalog::ALL_ZERO_TRIPLET, "lost", Subject::marker(name))
-                    .with("samples", Fact::count(rows.len()))
-                    .at_rows(rows)
-            });
+            .map(|(name, rows)| all_zero(&name, rows));
         let placeholders = self.placeholders.findings();
         zeros
             .chain(placeholders)
             .chain(not_numbers(&self.nans))
             .collect()
     }
+}
+
+/// The finding about samples that are all zeros, or a body's pose that is none.
+fn all_zero(name: &str, rows: Vec<u64>) -> Finding {
+    Finding::of_kind(catalog::ALL_ZERO_TRIPLET, "lost", Subject::marker(name))
+        .with("samples", Fact::count(rows.len()))
+        .at_rows(rows)
 }
 
 /// The finding about cells of the tracker that say that they hold no number: one for all columns.
