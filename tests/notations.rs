@@ -408,26 +408,43 @@ fn poses_of_the_tracker_in_the_body_are_inverted() {
     assert!(error.expect("checked") < 3.0 * NOISE.0, "{error:?}");
 }
 
-/// The joints of a head are called as the angles of a body are: the columns that are not used are said to be called as joints.
+/// The joints of a head are called as the angles of a body are: beside a position, and where other columns are those of the joints, they are the body's.
 #[test]
-fn columns_of_joints_that_are_not_used_are_to_be_checked() {
-    let head = arm()
-        .replace("\"j1\"", "\"yaw\"")
-        .replace("\"j2\"", "\"pitch\"");
-    let head = head.replace("\"j3\"", "\"roll\"");
-    let rows = recorded(20, false, 11);
-    let mut text = "q1,q2,q3,q4,q5,q6,x,y,z,roll,pitch,yaw".to_owned();
-    for (q, pose) in &rows {
-        let cells = q.iter().map(|d| format!("{:.5}", d.to_radians()));
-        let numbers = with(place(pose, 1.0), fixed(pose)).into_iter();
-        let cells: Vec<String> = cells.chain(numbers.map(|v| format!("{v:.6}"))).collect();
-        text += "\n";
-        text += &cells.join(",");
+fn angles_of_a_body_that_are_called_as_joints_are_no_joints() {
+    let mut head = arm();
+    for (joint, name) in [("j1", "yaw"), ("j2", "pitch"), ("j3", "roll")] {
+        head = head.replace(&format!("\"{joint}\""), &format!("\"{name}\""));
     }
-    let dir = Scratch::new()
-        .file("arm.urdf", head)
-        .file("poses.csv", text + "\n");
-    let said = dir.calib(["init", "arm.urdf", "poses.csv", "-o", "arm.yaml"]);
-    let words = said.words() + &said.stderr;
-    assert!(words.contains("are called as joints are"), "{words}");
+    let rows = recorded(20, false, 11);
+    let write = |names: &str, of_body: &str| {
+        let mut text = format!("{names},x,y,z,{of_body}");
+        for (q, pose) in &rows {
+            let cells = q.iter().map(|d| format!("{:.5}", d.to_radians()));
+            let numbers = with(place(pose, 1.0), fixed(pose)).into_iter();
+            let cells: Vec<String> = cells.chain(numbers.map(|v| format!("{v:.6}"))).collect();
+            text += "\n";
+            text += &cells.join(",");
+        }
+        text + "\n"
+    };
+    for (names, of_body, map) in [
+        ("q1,q2,q3,q4,q5,q6", "roll,pitch,yaw", "yaw: q1"),
+        (
+            "yaw_actual,pitch_actual,roll_actual,j4,j5,j6",
+            "roll,pitch,yaw",
+            "yaw: yaw_actual",
+        ),
+        ("yaw,pitch,roll,j4,j5,j6", "rx,ry,rz", "joint_columns: ["),
+    ] {
+        let dir = Scratch::new()
+            .file("arm.urdf", head.as_str())
+            .file("poses.csv", write(names, of_body));
+        let said = dir.calib(["init", "arm.urdf", "poses.csv", "-o", "arm.yaml"]);
+        assert_eq!(said.code, 0, "{}{}", said.stdout, said.stderr);
+        let profile = dir.read("arm.yaml");
+        assert!(profile.contains(map), "{names}: {profile}");
+        let angles = of_body.replace(',', ", ");
+        assert!(profile.contains(&angles), "{names}: {profile}");
+        assert!(profile.contains("pose: true"), "{names}: {profile}");
+    }
 }

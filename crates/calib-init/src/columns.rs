@@ -6,10 +6,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use calib_recording::{AngleUnit, LengthUnit, TimeColumn, TimeUnit};
+use calib_recording::{AngleUnit, BodyColumns, LengthUnit, TimeColumn, TimeUnit};
 use calib_urdf::{JointId, JointKind, RobotModel};
 
-use crate::fact::{About, AngleHow, LengthHow};
+use crate::fact::{About, AngleHow, LengthHow, Notation};
 use crate::guess::{Guess, TURN};
 use crate::header::Header;
 use crate::name::{self, NamedUnit};
@@ -27,7 +27,9 @@ pub fn guess(model: &RobotModel, header: &Header) -> Guess {
     guess.map.decimal_comma = header.decimal_comma;
     let mut used: BTreeSet<usize> = BTreeSet::new();
     time(header, &mut guess, &mut used);
-    let (stated, named) = like_coordinates(model, header);
+    let (stated, mut named) = like_coordinates(model, header);
+    let of_pose = angles_of_a_pose(model, header, &stated, &named);
+    named.retain(|i| !of_pose.contains(i));
     // The columns `x`, `y` and `z` are a marker where the table has no other.
     let both: BTreeSet<usize> = stated.union(&named).copied().collect();
     tracked::tracked(header, &mut guess, &mut used, &both);
@@ -156,6 +158,38 @@ fn like_coordinates(model: &RobotModel, header: &Header) -> (BTreeSet<usize>, BT
     };
     let all = (0..header.names.len()).filter(of_joint);
     all.partition(|i| header.names[*i].starts_with(JOINT))
+}
+
+/// Columns that have the names of joints, such as `yaw`, and are the orientation of a body: a position stands beside them, and other columns are those
+/// of the joints.
+fn angles_of_a_pose(
+    model: &RobotModel,
+    header: &Header,
+    stated: &BTreeSet<usize>,
+    named: &BTreeSet<usize>,
+) -> BTreeSet<usize> {
+    let mut seen = Guess::default();
+    tracked::tracked(header, &mut seen, &mut BTreeSet::new(), stated);
+    let is_named = |column: &String| header.position(column).is_some_and(|i| named.contains(&i));
+    let of_body = |body: &BodyColumns| -> Vec<usize> {
+        let turns = Notation::of(body).map_or_else(Vec::new, |(_, columns)| columns);
+        let all = !body.position.iter().any(is_named) && turns.iter().all(is_named);
+        let turns = turns.iter().filter(|_| all);
+        turns.filter_map(|column| header.position(column)).collect()
+    };
+    let angles: BTreeSet<usize> = seen.map.bodies.values().flat_map(of_body).collect();
+    if angles.is_empty() {
+        return angles;
+    }
+    let count = |without: &BTreeSet<usize>| {
+        let (mut guess, mut used) = (Guess::default(), without.clone());
+        joints(model, header, &mut guess, &mut used);
+        guess.joints.len()
+    };
+    match count(&angles) >= count(&BTreeSet::new()) {
+        true => angles,
+        false => BTreeSet::new(),
+    }
 }
 
 /// Columns of joints.

@@ -132,9 +132,25 @@ const TURNS: [&str; 10] = [
 /// Words before the letter of an angle.
 const ANGLES: [&str; 7] = ["euler", "eul", "rpy", "angle", "angles", "ang", "theta"];
 /// Words before the letter or number of a rotation vector.
-const VECTORS: [&str; 5] = ["rvec", "rotvec", "rodrigues", "rotationvector", "rotvector"];
-/// Words that say of a body that it has a pose.
-const FILLERS: [&str; 4] = ["pose", "transform", "field", "data"];
+const VECTORS: [&str; 7] = [
+    "rvec",
+    "rotvec",
+    "rodrigues",
+    "rotationvector",
+    "rotvector",
+    "rv",
+    "aa",
+];
+/// Words that say of a body that it has a pose, or of numbers that they are several.
+const FILLERS: [&str; 7] = [
+    "pose",
+    "transform",
+    "field",
+    "data",
+    "vec",
+    "vector",
+    "axis",
+];
 
 impl Part {
     /// All readings of a name without its unit.
