@@ -22,6 +22,7 @@ pub mod limits;
 pub mod links;
 pub mod mistake;
 pub mod name;
+mod parts;
 pub mod proposal;
 mod propose;
 mod quaternions;
