@@ -453,3 +453,46 @@ fn angles_of_a_body_that_are_called_as_joints_are_no_joints() {
         assert!(profile.contains("pose: true"), "{names}: {profile}");
     }
 }
+
+/// The pose that a controller computed, in other letters beside that of the tracker, takes no place of it: it is left out.
+#[test]
+fn a_pose_in_capital_letters_beside_one_in_small_ones_is_another_body() {
+    let nominal = RobotModel::from_urdf_text(&arm(), "arm").expect("an arm");
+    let real = arm().replace("0.05 0.07 0.1", "0.053 0.068 0.103");
+    let robot = RobotModel::from_urdf_text(&real, "arm").expect("an arm");
+    let link = nominal.link_id("l6").expect("there");
+    let mut text = "j1,j2,j3,j4,j5,j6,x,y,z,qx,qy,qz,qw,X,Y,Z,A,B,C".to_owned();
+    let tracker_from_root = Isometry3::from_parts(
+        Translation3::new(0.9, 0.3, 0.1),
+        UnitQuaternion::from_euler_angles(0.4, -0.9, 0.7),
+    );
+    for (row, (q, _)) in recorded(30, false, 12).iter().enumerate() {
+        let angles: Vec<f64> = q.iter().map(|d| d.to_radians()).collect();
+        let jitter = 2e-4 * Vector3::new((7.0 * row as f64).sin(), (3.0 * row as f64).cos(), 0.3);
+        let seen =
+            tracker_from_root * robot.root_from_link(&angles, link) * Translation3::from(jitter);
+        let computed = nominal.root_from_link(&angles, link);
+        let [x, y, z] = degrees(fixed(&computed));
+        let numbers = with(place(&seen, 1.0), scalar_last(&seen));
+        let numbers = with(with(numbers, place(&computed, 1.0)), [z, y, x]);
+        let joints = angles.iter().map(|a| format!("{a:.7}"));
+        let cells = joints.chain(numbers.iter().map(|v| format!("{v:.7}")));
+        text += "\n";
+        text += &cells.collect::<Vec<String>>().join(",");
+    }
+    let dir = Scratch::new()
+        .file("arm.urdf", arm())
+        .file("poses.csv", text + "\n");
+    let said = dir.calib(["init", "arm.urdf", "poses.csv", "-o", "arm.yaml"]);
+    let profile = dir.read("arm.yaml");
+    assert!(
+        profile.contains("quaternion_xyzw: [qx, qy, qz, qw]"),
+        "{profile}"
+    );
+    assert!(!profile.contains("[A, B, C]"), "{profile}");
+    assert!(
+        said.words().contains("A controller computed them"),
+        "{}",
+        said.words()
+    );
+}

@@ -158,6 +158,9 @@ fn other_notations(
             Err(_) if of.is_empty() => "m".to_owned(),
             Err(_) => of,
         };
+        let is_taken = |name: &String| guess.map.bodies.contains_key(name);
+        let mut names = std::iter::once(name.clone()).chain((2..).map(|k| format!("{name}_{k}")));
+        let name = names.find(|name| !is_taken(name)).unwrap_or(name);
         if !ways.is_empty() {
             guess.other_turns.insert(name.clone(), ways);
         }
