@@ -29,7 +29,9 @@ pub(crate) fn tracked(
 ) {
     let (mut places, mut turns) = (Groups::new(), Groups::new());
     let free = |i: &usize| !used.contains(i) && !joints.contains(i) && header.has_numbers(*i);
-    let free: Vec<usize> = (0..header.names.len()).filter(free).collect();
+    let mut free: Vec<usize> = (0..header.names.len()).filter(free).collect();
+    // `x` belongs to `qx`, and `X` beside it to something else.
+    free.sort_by_key(|i| header.names[*i].contains(char::is_uppercase));
     for &i in &free {
         let unit = header.unit(i);
         if !matches!(unit.unit, None | Some(NamedUnit::Length(_))) {
