@@ -29,7 +29,7 @@ const JOINTS: [(&str, [f64; 3]); 6] = [
 ];
 
 /// The arm with every origin off by a vector of this size, m, and its axes by as many rad.
-fn arm(error: f64, seed: u64) -> String {
+pub fn arm(error: f64, seed: u64) -> String {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut text = "<robot name=\"arm\">\n  <link name=\"l0\"/>\n".to_owned();
     for (i, (axis, origin)) in JOINTS.iter().enumerate() {

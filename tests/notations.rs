@@ -10,28 +10,12 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 use scratch::Scratch;
 
-/// Axis and origin of each joint, m.
-const JOINTS: [(&str, [f64; 3]); 6] = [
-    ("0 0 1", [0.0, 0.0, 0.32]),
-    ("0 1 0", [0.05, 0.07, 0.1]),
-    ("0 1 0", [0.0, -0.03, 0.45]),
-    ("0 0 1", [0.04, 0.0, 0.25]),
-    ("0 1 0", [0.0, 0.0, 0.22]),
-    ("0 0 1", [0.0, 0.0, 0.09]),
-];
 /// σ of a position, m, and of an orientation, rad.
 const NOISE: (f64, f64) = (2e-4, 5e-4);
 
+/// The arm of the drawing.
 fn arm() -> String {
-    let mut text = "<robot name=\"arm\">\n  <link name=\"l0\"/>\n".to_owned();
-    for (i, (axis, [x, y, z])) in JOINTS.iter().enumerate() {
-        text += &format!(
-            "  <link name=\"l{n}\"/>\n  <joint name=\"j{n}\" type=\"revolute\">\n    <parent link=\"l{i}\"/>\n    <child link=\"l{n}\"/>\n    \
-             <origin xyz=\"{x} {y} {z}\"/>\n    <axis xyz=\"{axis}\"/>\n    <limit lower=\"-3\" upper=\"3\" effort=\"50\" velocity=\"2\"/>\n  </joint>\n",
-            n = i + 1
-        );
-    }
-    text + "</robot>\n"
+    crate::computed::arm(0.0, 0)
 }
 
 /// A way to write a pose: the names of its columns, the numbers, and what the column map must say of it.

@@ -1,7 +1,7 @@
 //! Bodies whose coordinates a controller computed from its joints: no measurement.
 
 use calib_checks::structural::Chain;
-use calib_recording::Poses;
+use calib_recording::{BodyColumns, Poses};
 
 use crate::bodies::Found;
 use crate::fact::{About, Fact, Notation, Place};
@@ -30,12 +30,22 @@ pub fn computed(
     fixed: usize,
     noise: Option<f64>,
 ) -> Vec<(usize, Fact)> {
+    let poses = |body: &Found| -> Vec<&BodyColumns> {
+        let all = sources.iter().filter_map(|source| {
+            let map = source.columns.as_ref()?;
+            map.bodies.get(source.name_in_file(&body.name))
+        });
+        all.collect()
+    };
     let columns = |body: &Found| -> Vec<String> {
         let maps = || sources.iter().filter_map(|source| source.columns.as_ref());
         let of = |marker: &String| maps().find_map(|map| map.markers.get(marker));
         let of_markers = body.markers.iter().filter_map(of).flatten().cloned();
-        let pose = maps().find_map(|map| map.bodies.get(&body.name));
-        let pose = pose.filter(|_| body.markers.is_empty()).map(|pose| {
+        let pose = poses(body)
+            .into_iter()
+            .next()
+            .filter(|_| body.markers.is_empty());
+        let pose = pose.map(|pose| {
             let turns = Notation::of(pose).map_or_else(Vec::new, |(_, columns)| columns);
             [pose.position.to_vec(), turns].concat()
         });
@@ -43,10 +53,8 @@ pub fn computed(
     };
     // Controllers write angles, and round; a tracker that computes a pose from many markers mostly writes a quaternion.
     let is_quaternion = |body: &Found| {
-        let maps = sources.iter().filter_map(|source| source.columns.as_ref());
-        let poses = maps.filter_map(|map| map.bodies.get(&body.name));
-        let mut notations = poses.filter_map(Notation::of).map(|(notation, _)| notation);
-        notations.all(|notation| matches!(notation, Notation::Quaternion { .. }))
+        let mut notations = poses(body).into_iter().filter_map(Notation::of);
+        notations.all(|(notation, _)| matches!(notation, Notation::Quaternion { .. }))
     };
     let limit = |of: &Found| {
         let part = match of.markers.is_empty() && is_quaternion(of) {

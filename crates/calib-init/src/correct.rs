@@ -6,11 +6,11 @@ use calib_checks::structural::{
 use calib_recording::{AngleUnit, BodyColumns, ColumnMap, LengthUnit};
 use calib_urdf::{JointKind, RobotModel, doubt};
 
+use crate::conventions;
 use crate::error::InitError;
 use crate::header::{Header, header};
 use crate::mistake::Mistake;
 use crate::name::{self, NamedUnit, Unit};
-use crate::quaternions;
 use crate::session::Draft;
 use crate::source::Source;
 
@@ -158,7 +158,7 @@ pub fn corrected(
                 if names.is_empty() {
                     continue;
                 }
-                quaternions::reordered(model, &sources[at], &names, mistake)
+                conventions::as_written(model, &sources[at], &names, mistake)
             }
             _ => new_map(model, &sources[at], &scoped.hypothesis),
         };

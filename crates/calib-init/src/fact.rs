@@ -204,7 +204,7 @@ pub enum About {
         columns: Vec<String>,
         /// Those that seem to be an orientation.
         orientation: Vec<String>,
-        /// Those that are called as joints are.
+        /// Those that are named like joints.
         joints: Vec<String>,
         /// The one that seems to hold times as text.
         times: Option<String>,

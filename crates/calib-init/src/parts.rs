@@ -185,6 +185,9 @@ fn of_letter(last: &str, words: &[String]) -> Vec<(Option<Set>, usize)> {
 /// `T_x` as `pos_x`, `R_x` as `rot_x`.
 pub(crate) fn in_words(stem: &str) -> String {
     let (letter, rest) = stem.split_at(stem.chars().next().map_or(0, char::len_utf8));
+    if rest.starts_with(char::is_alphanumeric) {
+        return stem.to_owned();
+    }
     let word = match letter.to_lowercase().as_str() {
         "t" | "p" => "pos",
         "r" | "q" => "rot",

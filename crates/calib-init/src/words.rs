@@ -317,7 +317,7 @@ fn ignored(about: &About) -> String {
     }
     if !joints.is_empty() {
         text += &format!(
-            " {} are called as joints are: if they are the robot's, say so in the column map, and look at which columns are read as joints now.",
+            " {} are named like joints. If they hold the robot's joints, state it in the column map, and check which columns are read as joints now.",
             quoted(joints)
         );
     }

@@ -118,7 +118,7 @@ impl GoodnessOfFit {
     pub const SIGNIFICANT: f64 = 1e-3;
     /// …and when it explains this share of χ²: smaller ones are real but do not matter…
     pub const RELEVANT: f64 = 0.02;
-    /// …unless they move what they move by more than half its noise (mean square): the parameters then took up most of it.
+    /// …unless they move the measurements by more than half of their noise, this is its square: the parameters then took up most of it.
     pub const MOVES: f64 = 0.25;
 }
 

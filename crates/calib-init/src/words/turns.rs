@@ -20,7 +20,7 @@ pub(super) fn sentence(about: &About) -> String {
     match how {
         TurnsHow::Named => format!("{what}."),
         TurnsHow::Motion { rms, next } => format!(
-            "{what}: read so the body follows the robot to {} rms, with the next best notation to {}.",
+            "{what}: read so, the body follows the robot to {} rms, with the next best notation to {}.",
             mm(*rms),
             mm(*next)
         ),

@@ -11,7 +11,7 @@ use crate::source::Source;
 
 /// The map with the poses of these bodies, by their names in the profile, as the file has them; `None` where their columns are not found, or no map
 /// says it.
-pub fn reordered(
+pub fn as_written(
     model: &RobotModel,
     source: &Source,
     bodies: &[&String],
