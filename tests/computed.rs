@@ -148,6 +148,7 @@ fn the_body_that_a_controller_computed_is_named() {
         // The nominal arm, and one of the controller's own.
         for (error, decimals, id, kind) in [
             (0.0, 2, "not-measured", "body"),
+            (0.0, 1, "not-measured", "body"),
             (3e-4, 3, "model-disagrees", "frames"),
         ] {
             let dir = recorded(error, decimals, seed).file("arm.yaml", PROFILE);
@@ -170,6 +171,81 @@ fn the_body_that_a_controller_computed_is_named() {
                 .edit("arm.yaml", "f: [X, \"Y\", Z], ", "");
             let ran = dir.calib(["run", "arm.yaml", "--out", "out"]);
             assert_eq!(ran.code, 0, "{seed}: {}{}", ran.stdout, ran.stderr);
+        }
+    }
+}
+
+/// A table with the joints and one point behind the last, seen with noise, m, and written with so many decimals of a millimeter.
+fn points(robot: &RobotModel, noise: f64, decimals: usize, n: usize, seed: u64) -> String {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let link = robot.link_id("l6").expect("there");
+    let mut text = "j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg,X_mm,Y_mm,Z_mm".to_owned();
+    for _ in 0..n {
+        let q: Vec<f64> = (0..6).map(|_| rng.random_range(-1.5..1.5)).collect();
+        let mut cells: Vec<String> = q.iter().map(|q| format!("{:.3}", q.to_degrees())).collect();
+        let at = robot.root_from_link(&q, link) * Point3::new(0.02, -0.01, 0.15);
+        cells.extend(at.iter().map(|v| {
+            let n: f64 = StandardNormal.sample(&mut rng);
+            format!("{:.decimals$}", (v + noise * n) * 1e3)
+        }));
+        text += "\n";
+        text += &cells.join(",");
+    }
+    text + "\n"
+}
+
+/// The code of `calib run` of what `calib init` makes of such tables, and the kinds of `not-measured` that it names.
+fn alone(error: f64, noise: f64, decimals: usize, seed: u64) -> (i32, Vec<String>) {
+    let robot = RobotModel::from_urdf_text(&arm(error, seed), "arm").expect("an arm");
+    let dir = Scratch::new()
+        .file("arm.urdf", arm(0.0, 0))
+        .file("poses.csv", points(&robot, noise, decimals, 60, seed + 1))
+        .file("checks.csv", points(&robot, noise, decimals, 15, seed + 2));
+    dir.calib([
+        "init",
+        "arm.urdf",
+        "poses.csv",
+        "checks.csv",
+        "-o",
+        "arm.yaml",
+    ]);
+    let dir = dir.edit(
+        "arm.yaml",
+        "# limits: {held_out_rms_mm: 1}",
+        "limits: {held_out_rms_mm: 1}",
+    );
+    let ran = dir.calib(["run", "arm.yaml", "--out", "out", "--json"]);
+    // A run that stops before the fit says what `check` says.
+    let json = match ran.code {
+        3 => dir.calib(["check", "arm.yaml", "--json"]).json(),
+        _ => ran.json(),
+    };
+    let all = json["findings"].as_array().cloned().unwrap_or_default();
+    let of = all.iter().filter(|f| f["id"] == "not-measured");
+    let kinds = of.map(|f| f["facts"]["kind"].as_str().unwrap_or("").to_owned());
+    (ran.code, kinds.collect())
+}
+
+/// Nothing but the decimals of the file is left of the position that a controller shows, and nobody else measured.
+#[test]
+fn what_a_controller_computed_is_named_where_it_stands_alone() {
+    for (decimals, seed) in [(1, 41), (2, 42), (1, 43), (2, 44)] {
+        // With the model of the URDF nothing is left to calibrate.
+        let (code, kinds) = alone(0.0, 0.0, decimals, seed);
+        assert_eq!((code, kinds), (3, vec!["all".to_owned()]), "{decimals}");
+        // A controller that knows its own calibration.
+        let (code, kinds) = alone(2e-3, 0.0, decimals, seed);
+        assert_eq!((code, kinds), (0, vec!["fitted".to_owned()]), "{decimals}");
+    }
+}
+
+/// A tracker that scatters by half a step of the file, and by five.
+#[test]
+fn what_a_tracker_measured_is_not_called_computed() {
+    for (decimals, noise) in [(1, 5e-5), (2, 5e-5), (3, 1e-5)] {
+        for seed in 51..55 {
+            let (code, kinds) = alone(1e-3, noise, decimals, seed);
+            assert_eq!((code, kinds), (0, vec![]), "{decimals}: {seed}");
         }
     }
 }

@@ -1,5 +1,7 @@
 //! Robust spreads and ranges.
 
+use std::ops::RangeInclusive;
+
 use calib_geometry::statistics::SIGMA_PER_MAD;
 pub(crate) use calib_geometry::statistics::median;
 
@@ -26,14 +28,21 @@ pub(crate) fn robust_range_limit(sigma: f64, n: usize) -> f64 {
 /// The coarsest 10⁻ᵏ m, k from 2 to 5, of which all coordinates are multiples: positions were rounded to it when they were written. 0 where
 /// there is none, or finer: a step below 10 µm is below every tracker's noise.
 pub(crate) fn written_step(coordinates: impl Iterator<Item = f64> + Clone) -> f64 {
-    let steps = (2..=5).map(|k| 10f64.powi(k));
-    let on_grid = |x: f64, per_meter: f64| ((x * per_meter).round() - x * per_meter).abs() < 1e-4;
-    if coordinates.clone().next().is_none() {
+    step_of(coordinates, 2..=5)
+}
+
+/// The coarsest 10⁻ᵏ of these of which all values are multiples; 0 where there is none, and without values.
+pub(crate) fn step_of(
+    values: impl Iterator<Item = f64> + Clone,
+    decimals: RangeInclusive<i32>,
+) -> f64 {
+    let on_grid = |x: f64, per_unit: f64| ((x * per_unit).round() - x * per_unit).abs() < 1e-4;
+    if values.clone().next().is_none() {
         return 0.0;
     }
-    let found = steps
-        .into_iter()
-        .find(|per_meter| coordinates.clone().all(|x| on_grid(x, *per_meter)));
+    let found = decimals
+        .map(|k| 10f64.powi(k))
+        .find(|per_unit| values.clone().all(|x| on_grid(x, *per_unit)));
     found.map_or(0.0, f64::recip)
 }
 

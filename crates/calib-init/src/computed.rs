@@ -1,6 +1,6 @@
 //! Bodies whose coordinates a controller computed from its joints: no measurement.
 
-use calib_checks::structural::Chain;
+use calib_checks::structural::{BodyIndex, Chain, by_rounding_alone};
 use calib_recording::{BodyColumns, Poses};
 
 use crate::bodies::Found;
@@ -70,7 +70,8 @@ pub fn computed(
     if count < 2 {
         return Vec::new();
     }
-    let rms: Vec<Option<f64>> = (0..count)
+    // What the registration leaves, and how much of it rounding alone explains.
+    let rms: Vec<Option<(f64, Option<f64>)>> = (0..count)
         .map(|body| {
             if rows(scene, &scene.bodies[body]) < ROWS {
                 return None;
@@ -81,16 +82,18 @@ pub fn computed(
                 .all
                 .iter()
                 .find(|(link, _)| *link == scene.model.root());
-            of_root
-                .is_some_and(|(_, rms)| *rms > MOVED)
-                .then_some(choice.rms)
+            let moves = of_root.is_some_and(|(_, rms)| *rms > MOVED);
+            let rounded =
+                || by_rounding_alone(&scene.data(&chain, &[(body, choice.link)]), BodyIndex(0));
+            moves.then(|| (choice.rms, rounded()))
         })
         .collect();
     let found = (fixed..count).filter_map(|body| {
         let one = &scene.bodies[body];
-        let own = rms[body].filter(|rms| *rms < limit(one))?;
+        let (own, rounded) = rms[body]?;
+        let own = Some(own).filter(|rms| *rms < limit(one)).or(rounded)?;
         let others = (0..count).filter(|other| *other != body);
-        let others = others.filter_map(|other| Some((other, rms[other]?)));
+        let others = others.filter_map(|other| Some((other, rms[other]?.0)));
         let (other, next) = others.max_by(|a, b| a.1.total_cmp(&b.1))?;
         let about = About::Computed {
             body: one.name.clone(),

@@ -31,7 +31,11 @@ impl Measured {
     }
 
     /// Whether anything of the body was seen in a row.
-    pub(super) fn seen(&self, row: usize) -> bool {
+    ///
+    /// # Panics
+    /// Without such a row.
+    #[must_use]
+    pub fn seen(&self, row: usize) -> bool {
         match self {
             Self::Markers(rows) => rows[row].iter().any(Option::is_some),
             Self::Poses {

@@ -77,6 +77,7 @@ mod ranking;
 mod readings;
 mod registration;
 mod rotation;
+mod rounding;
 mod rows;
 mod scan;
 mod score;
@@ -107,5 +108,6 @@ pub use outcome::{
 };
 pub use readings::WrongReadings;
 pub use registration::{PointRows, Registered, registration};
+pub use rounding::{Rounding, by_rounding_alone, rounding};
 pub use rows::{Deviation, Deviations, deviations};
 pub use thinning::thin;

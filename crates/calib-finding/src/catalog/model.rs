@@ -228,6 +228,9 @@ super::topic! {
         "all": Error,
             "The recordings fit the nominal robot to {none} rms. No robot is that close to its drawing, and no tracker is that precise: these coordinates were computed from the joint values, by a controller or a simulation, and say nothing of the real robot.",
             "Record what a tracker measures. The position of the tool that a controller shows or logs is no measurement; leave its columns out.";
+        "fitted": Warning,
+            "The fit leaves {left} rms of the positions of body `{body}`[[, as the decimals of the file do: they alone leave {rounding}]]. Neither the noise of a tracker nor the repeatability of a robot shows: the coordinates may have been computed from the joint values, by a controller that knows its own calibration or by a simulation. Then the result says what that program assumes, and nothing of the real robot.",
+            "If a tracker measured them, record positions and joint values with more decimals. If a controller computed them, record what a tracker measures.";
     }
     /// A body that could not be compared with the robot.
     NOT_CHECKED = "not-checked" {

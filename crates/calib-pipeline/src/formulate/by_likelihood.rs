@@ -18,7 +18,7 @@ use crate::formulate::realign::realign;
 use crate::formulate::solved::Solved;
 use crate::formulate::stuck::{is_stuck, without_stuck};
 use crate::formulate::{
-    cameras, clock, gain_or_scale, gear_ratio, noise, priors, row_levels, starts, wanted,
+    cameras, clock, computed, gain_or_scale, gear_ratio, noise, priors, row_levels, starts, wanted,
 };
 use crate::prepare::inputs::Inputs;
 use crate::prepare::repeats::merge;
@@ -81,6 +81,9 @@ pub fn likelihood(
     let of_rows = row_levels::findings(inputs, &fit.formulation.samples);
     checked.findings.extend(of_rows);
     checked.findings.extend(noise::meaning(&mut fit));
+    checked
+        .findings
+        .extend(computed::of_bodies(inputs, &checked.tracks, &fit));
     checked.findings.extend(on_their_limit(&fit));
     checked.findings.extend(of_the_wrong_sign(&fit));
     checked.findings.extend(priors::contradicted(&fit));

@@ -9,6 +9,7 @@ pub mod checked;
 pub mod chosen;
 pub mod clock;
 pub(crate) mod completed;
+mod computed;
 pub(crate) mod contact_directions;
 pub mod contacts;
 mod exchanged_poses;

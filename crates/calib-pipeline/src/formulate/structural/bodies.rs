@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 
-use calib_checks::structural::{Measured, Outcome, registration_residual};
+use calib_checks::structural::{
+    BodyIndex, Measured, Outcome, by_rounding_alone, registration_residual,
+};
 use calib_finding::{Fact, Finding, Subject, catalog};
 
 use super::layout::Layout;
@@ -38,7 +40,8 @@ pub(super) fn computed(layout: &Layout<'_>, tracks: &BTreeMap<String, BodyTrack>
         let noise = others.filter_map(|other| tracks[*other].marker_sigma);
         let noise = noise.min_by(f64::total_cmp);
         let limit = noise.map_or(super::COMPUTED, |noise| COMPUTED.min(BELOW * noise));
-        let rms = rms.filter(|rms| *rms < limit)?;
+        let exact = Some((*rms)?).filter(|rms| *rms < limit);
+        let rms = exact.or_else(|| by_rounding_alone(&layout.data, BodyIndex(body)))?;
         let others = alone.iter().enumerate().filter(|(b, _)| *b != body);
         let others = others.filter_map(|(b, rms)| Some((b, (*rms)?)));
         let beside = others.max_by(|a, b| a.1.total_cmp(&b.1))?;

@@ -19,8 +19,9 @@ mod without;
 use std::collections::{BTreeMap, BTreeSet};
 
 use calib_checks::structural::{
-    Chain, Correction, Decision, Hypothesis, JointIndex, Options, Outcome, RecordingIndex, Scope,
-    Scoped, WrongReadings, apply_all, explain, registration_residual, thin,
+    BodyIndex, Chain, Correction, Decision, Hypothesis, JointIndex, Options, Outcome,
+    RecordingIndex, Scope, Scoped, WrongReadings, apply_all, by_rounding_alone, explain,
+    registration_residual, thin,
 };
 use calib_finding::{Fact, Finding, Severity, Subject, catalog};
 use calib_profile::Usage;
@@ -133,10 +134,17 @@ fn not_measured(layout: &Layout<'_>, outcome: &Outcome, sigma: f64) -> Option<Fi
     const BELOW: f64 = 0.1;
     /// Rows that leave a residual.
     const ROWS: usize = 6;
+    /// A good robot with short links is as close to its drawing as what is written in larger steps shows, m.
+    const FINE: f64 = 1e-4;
     let consistent = matches!(outcome.decision, Decision::Consistent { .. });
     let moves = !outcome.design.moving.is_empty() && outcome.rows >= ROWS;
     let limit = COMPUTED.min(BELOW * sigma);
-    (consistent && moves && outcome.rms < limit).then(|| {
+    let rounded = || {
+        (0..layout.bodies.len()).all(|body| {
+            by_rounding_alone(&layout.data, BodyIndex(body)).is_some_and(|left| left < FINE)
+        })
+    };
+    (consistent && moves && (outcome.rms < limit || rounded())).then(|| {
         let recordings = layout.recordings.iter().map(|r| r.name.clone()).collect();
         let subject = Subject {
             recordings,
