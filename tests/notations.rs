@@ -183,7 +183,7 @@ const WAYS: [Way; 18] = [
 ];
 
 /// Postures of the arm in degrees, and the pose of a body on its last link that a tracker saw.
-fn recorded(n: usize, one_joint_at_a_time: bool, seed: u64) -> Vec<(Vec<f64>, Isometry3<f64>)> {
+pub fn recorded(n: usize, one_joint_at_a_time: bool, seed: u64) -> Vec<(Vec<f64>, Isometry3<f64>)> {
     let model = RobotModel::from_urdf_text(&arm(), "arm").expect("an arm");
     let link = model.link_id("l6").expect("there");
     let mut rng = ChaCha8Rng::seed_from_u64(seed);

@@ -24,6 +24,7 @@ mod fleet;
 mod fleet_faults;
 mod gains;
 mod gantry;
+mod headers;
 mod held_readings;
 mod holds_and_rows;
 mod homed;

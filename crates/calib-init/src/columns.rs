@@ -12,6 +12,7 @@ use calib_urdf::{JointId, JointKind, RobotModel};
 use crate::fact::{About, AngleHow, LengthHow, Notation};
 use crate::guess::{Guess, TURN};
 use crate::header::Header;
+use crate::located::HeaderPlace;
 use crate::name::{self, NamedUnit};
 use crate::robot;
 use crate::tracked;
@@ -25,6 +26,13 @@ const FAR: f64 = 20.0;
 pub fn guess(model: &RobotModel, header: &Header) -> Guess {
     let mut guess = Guess::default();
     guess.map.decimal_comma = header.decimal_comma;
+    if header.place != HeaderPlace::First {
+        guess.map.skip_lines = header.skip;
+        guess.map.delimiter = Some(header.delimiter);
+    }
+    if header.place == HeaderPlace::Comment {
+        guess.map.names.clone_from(&header.names);
+    }
     let mut used: BTreeSet<usize> = BTreeSet::new();
     time(header, &mut guess, &mut used);
     let (stated, mut named) = like_coordinates(model, header);

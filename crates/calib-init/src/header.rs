@@ -1,7 +1,9 @@
 //! The header of a delimited table, and the first of its numbers.
 
-use calib_recording::{Delimiter, StatedUnit, date_time, stated_separator, unit_row, utf8};
+use calib_recording::{Delimiter, StatedUnit, date_time, unit_row, utf8};
 
+use crate::delimited::cells;
+use crate::located::{HeaderPlace, Located, is_comment, locate};
 use crate::name::{self, NamedUnit, Unit};
 
 /// Rows that are looked at.
@@ -24,6 +26,10 @@ pub struct Header {
     pub decimal_comma: bool,
     /// The last line above the numbers, from 1: the header, or the row of units below it.
     pub line: u64,
+    /// Lines that a reader must be told to skip, of a header that is not the first line or is a comment.
+    pub skip: u64,
+    /// Where the header stands.
+    pub place: HeaderPlace,
     /// Units from a row below the header; empty without such a row.
     pub units: Vec<Option<StatedUnit>>,
     /// What separates the cells.
@@ -75,7 +81,7 @@ impl Header {
     }
 }
 
-/// Reads the header line (the first that is neither blank nor a comment nor states the separator), the row of units below it, and the first rows;
+/// Reads the header line ([`locate`]), the row of units below it, and the first rows;
 /// `None` where there is no such table.
 #[must_use]
 pub fn header(bytes: &[u8]) -> Option<Header> {
@@ -87,24 +93,23 @@ pub fn header(bytes: &[u8]) -> Option<Header> {
         Ok(text) => text,
         Err(e) => std::str::from_utf8(&bytes[..e.valid_up_to()]).ok()?,
     };
-    let mut lines = text
-        .lines()
-        .enumerate()
-        .filter(|(_, line)| !line.trim().is_empty() && !line.starts_with('#'));
-    let (mut above, mut first) = lines.next()?;
-    let stated = stated_separator(first).filter(|_| above == 0);
-    if stated.is_some() {
-        (above, first) = lines.next()?;
-    }
-    let separator = match stated {
-        Some(stated) => of_delimiter(stated.ok()?),
-        None => separator(first),
-    };
-    let names: Vec<String> = cells(first, separator).map(str::to_owned).collect();
+    let Located {
+        line: mut above,
+        names,
+        separator,
+        place,
+    } = locate(text)?;
     // Without a single name that is none of a number it is a table without header.
     if names.len() < 2 || names.iter().all(|n| n.parse::<f64>().is_ok()) {
         return None;
     }
+    let lines = text.lines().enumerate().skip(above + 1);
+    let lines = lines.filter(|(_, line)| !line.trim().is_empty() && !is_comment(line));
+    let skip = match place {
+        HeaderPlace::First => 0,
+        HeaderPlace::Below => above as u64,
+        HeaderPlace::Comment => above as u64 + 1,
+    };
     let mut units = Vec::new();
     let mut rows: Vec<&str> = Vec::new();
     for (number, line) in lines.take(ROWS) {
@@ -153,6 +158,8 @@ pub fn header(bytes: &[u8]) -> Option<Header> {
         texts,
         decimal_comma,
         line: above as u64 + 1,
+        skip,
+        place,
         units,
         delimiter: match separator {
             Some(';') => Delimiter::Semicolon,
@@ -161,32 +168,6 @@ pub fn header(bytes: &[u8]) -> Option<Header> {
             None => Delimiter::Space,
         },
     })
-}
-
-fn of_delimiter(delimiter: Delimiter) -> Option<char> {
-    match delimiter {
-        Delimiter::Comma => Some(','),
-        Delimiter::Semicolon => Some(';'),
-        Delimiter::Tab => Some('\t'),
-        Delimiter::Space => None,
-    }
-}
-
-/// What separates the cells of a line; `None`: blanks.
-fn separator(line: &str) -> Option<char> {
-    let count = |c: char| line.matches(c).count();
-    let most = [',', ';', '\t'].into_iter().max_by_key(|c| count(*c));
-    most.filter(|c| count(*c) > 0)
-}
-
-fn cells(line: &str, separator: Option<char>) -> Box<dyn Iterator<Item = &str> + '_> {
-    fn clean(cell: &str) -> &str {
-        cell.trim().trim_matches('"').trim()
-    }
-    match separator {
-        Some(separator) => Box::new(line.split(separator).map(clean)),
-        None => Box::new(line.split_whitespace().map(clean)),
-    }
 }
 
 #[cfg(test)]

@@ -319,8 +319,8 @@ pub(crate) fn unit_of_turns(header: &Header, guess: &mut Guess) {
         let of: Vec<usize> = names.iter().filter_map(|n| header.position(n)).collect();
         let mut unit = None;
         if !matches!(notation, Notation::Quaternion { .. }) {
-            let (native, angle) = unit_of(header, &of);
-            if !native && angle != guess.map.angles {
+            let (_, angle) = unit_of(header, &of);
+            if angle != guess.map.angles {
                 guess.map.body_angles = Some(angle);
             }
             unit = Some(angle);

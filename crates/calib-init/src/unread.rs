@@ -114,6 +114,8 @@ mod tests {
             texts: vec![None; names.len()],
             decimal_comma: false,
             line: 1,
+            skip: 0,
+            place: crate::located::HeaderPlace::First,
             units: Vec::new(),
             delimiter: Delimiter::Comma,
         }

@@ -19,6 +19,12 @@ super::topic! {
             "{samples:sample} whose coordinates are all exactly {value}, far from the others of the marker; taken as lost.",
             "Export lost samples as empty.";
     }
+    /// Poses without a position or without an orientation.
+    HALF_A_POSE = "half-a-pose" {
+        "": Warning,
+            "{samples:sample} with a position and no orientation, or an orientation and no position; taken as lost.",
+            "Export lost samples as empty. If the tracker sees a point only, give it as a marker.";
+    }
     /// Two markers with the same coordinates.
     DUPLICATE_COLUMN = "duplicate-column" {
         "": Error,

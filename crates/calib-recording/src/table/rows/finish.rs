@@ -159,9 +159,13 @@ impl Rows<'_> {
         let zeros = std::mem::take(&mut self.zeros)
             .into_iter()
             .map(|(name, rows)| all_zero(&name, rows));
+        let halves = std::mem::take(&mut self.halves)
+            .into_iter()
+            .map(|(name, rows)| half_a_pose(&name, rows));
         let placeholders = self.placeholders.findings();
         zeros
             .chain(placeholders)
+            .chain(halves)
             .chain(not_numbers(&self.nans))
             .collect()
     }
@@ -170,6 +174,13 @@ impl Rows<'_> {
 /// The finding about samples that are all zeros, or a body's pose that is none.
 fn all_zero(name: &str, rows: Vec<u64>) -> Finding {
     Finding::of_kind(catalog::ALL_ZERO_TRIPLET, "lost", Subject::marker(name))
+        .with("samples", Fact::count(rows.len()))
+        .at_rows(rows)
+}
+
+/// The finding about poses without a position, or without an orientation.
+fn half_a_pose(name: &str, rows: Vec<u64>) -> Finding {
+    Finding::new(catalog::HALF_A_POSE, Subject::body(name))
         .with("samples", Fact::count(rows.len()))
         .at_rows(rows)
 }

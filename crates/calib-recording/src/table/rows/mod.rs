@@ -55,6 +55,8 @@ pub(super) struct Rows<'a> {
     dense: usize,
     zeros: BTreeMap<String, Vec<u64>>,
     placeholders: Placeholders,
+    /// Rows of bodies with a position and no orientation, or the other way round.
+    halves: BTreeMap<String, Vec<u64>>,
     nans: BTreeMap<String, Vec<u64>>,
     /// Columns whose times are dates, and whether these state their offset from UTC.
     dates: BTreeMap<usize, bool>,
@@ -94,6 +96,7 @@ impl<'a> Rows<'a> {
             dense: 0,
             zeros: BTreeMap::new(),
             placeholders: Placeholders::default(),
+            halves: BTreeMap::new(),
             nans: BTreeMap::new(),
             dates: BTreeMap::new(),
             layout,

@@ -75,6 +75,12 @@ impl Rows<'_> {
         if given == 0 {
             return Ok(None);
         }
+        // The pose of nothing has no position, and often the orientation of a frame that nobody turned.
+        let missing = |slots: &[usize]| slots.iter().all(|&slot| self.values[slot].is_nan());
+        if missing(position) || missing(rotation.slots()) {
+            self.halves.entry(name).or_default().push(line);
+            return Ok(None);
+        }
         if given < needed {
             return Err((
                 At::Line(line),
