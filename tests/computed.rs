@@ -176,7 +176,7 @@ fn the_body_that_a_controller_computed_is_named() {
 }
 
 /// A table with the joints and one point behind the last, seen with noise, m, and written with so many decimals of a millimeter.
-fn points(robot: &RobotModel, noise: f64, decimals: usize, n: usize, seed: u64) -> String {
+pub fn points(robot: &RobotModel, noise: f64, decimals: usize, n: usize, seed: u64) -> String {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let link = robot.link_id("l6").expect("there");
     let mut text = "j1_deg,j2_deg,j3_deg,j4_deg,j5_deg,j6_deg,X_mm,Y_mm,Z_mm".to_owned();

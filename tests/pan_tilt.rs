@@ -77,3 +77,48 @@ fn right_sessions_of_a_small_robot_are_not_rejected() {
     // The sessions are of the kind in question: registration alone does as well in most of them.
     assert!(as_good >= 30, "{as_good}");
 }
+
+/// No recording moves the pan: how far a prediction with it elsewhere is off, nobody measured.
+#[test]
+fn predictions_with_a_joint_that_stood_still_say_so() {
+    let profile = PROFILE.replace("pan_deg: [-100, 100], ", "");
+    let table = "pan_deg,tilt_deg\n0,10\n0.01,-20\n0.2,10\n40,10\n";
+    let dir = Scratch::new()
+        .file("head.urdf", URDF)
+        .file("head.yaml", &profile)
+        .file("new.csv", table);
+    dir.calib(["simulate", "head.yaml", "--out", "."]).expect(0);
+    let ran = dir.calib(["run", "head.yaml", "--out", "results"]);
+    assert!(ran.code < 2, "{}", ran.stderr);
+    let model = dir.json("results/head.calibrated.model.json");
+    let pan = &model["joints"][0];
+    assert_eq!(pan["fitted_range"].to_string(), "[0.0,0.0]", "{pan}");
+    let said = dir
+        .calib([
+            "predict",
+            "results/head.calibrated.model.json",
+            "new.csv",
+            "--of",
+            "plate",
+        ])
+        .expect(0);
+    let rows: Vec<Vec<&str>> = said
+        .stdout
+        .lines()
+        .skip(1)
+        .map(|l| l.split(',').collect())
+        .collect();
+    let scopes: Vec<&str> = rows.iter().map(|row| row[1]).collect();
+    assert_eq!(scopes, ["inside", "inside", "outside:pan", "outside:pan"]);
+    let known: Vec<bool> = rows
+        .iter()
+        .map(|row| row[9..].iter().all(|c| !c.is_empty()))
+        .collect();
+    assert_eq!(known, [true, true, false, false], "{}", said.stdout);
+    assert!(rows[3][9..].iter().all(|c| c.is_empty()), "{}", said.stdout);
+    assert!(
+        said.stderr.contains("no recording moved pan"),
+        "{}",
+        said.stderr
+    );
+}

@@ -40,6 +40,7 @@ mod layering;
 mod loads;
 mod many_markers;
 mod mimics;
+mod mirrored;
 mod month;
 mod notations;
 mod occluded;

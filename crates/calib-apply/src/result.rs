@@ -38,6 +38,9 @@ const UNCHANGED: f64 = 1e-12;
 pub fn find(path: &Path, force: bool) -> Result<Calibrated, ApplyError> {
     let (urdf, report) = locate(path)?;
     let mut notes = Vec::new();
+    let held_out = report
+        .as_ref()
+        .and_then(|r| r.verification.held_out.clone());
     match report.as_ref().map(|r| r.verdict) {
         Some(Verdict::Accepted) => {}
         Some(Verdict::AcceptedWithWarnings) => {
@@ -75,6 +78,16 @@ pub fn find(path: &Path, force: bool) -> Result<Calibrated, ApplyError> {
             "joint effects that a URDF cannot hold stay in {}: without them a part of the error remains",
             effects.display()
         ));
+        let held_out = held_out.filter(|held_out| !held_out.urdf_alone_gains());
+        if let Some((alone, untouched)) =
+            held_out.and_then(|h| Some((h.urdf_alone?, h.registration_only?)))
+        {
+            notes.push(format!(
+                "without these effects this URDF predicts new poses to {:.2} mm rms, the untouched one to {:.2} mm: use it with the effects only",
+                1e3 * alone.rms_m,
+                1e3 * untouched.rms_m
+            ));
+        }
     }
     Ok(Calibrated {
         urdf,

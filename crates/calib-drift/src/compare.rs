@@ -105,6 +105,8 @@ pub struct Drift {
     pub same_nominal: bool,
     /// Which of both were rejected: what their models do not explain may look like a change.
     pub rejected: Vec<String>,
+    /// Effects that the residuals of one of them show and its model lacks, by report: what they make of other postures looks like a change.
+    pub lacking: Vec<(String, Vec<String>)>,
     /// Both were made from the same recordings.
     pub same_recordings: bool,
     /// Parameters that only the old calibration had.
@@ -184,6 +186,11 @@ pub fn compare(old: &Evidence, new: &Evidence) -> Result<Drift, DriftError> {
             .iter()
             .filter(|e| e.rejected)
             .map(|e| e.file.clone())
+            .collect(),
+        lacking: [old, new]
+            .iter()
+            .filter(|e| !e.lacking.is_empty())
+            .map(|e| (e.file.clone(), e.lacking.clone()))
             .collect(),
         same_recordings: !new.recordings.is_empty() && old.recordings == new.recordings,
         only_old,

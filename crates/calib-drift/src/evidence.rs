@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use calib_finding::{Fact, catalog};
 use calib_geometry::decompose;
 use calib_report::{DataInformation, NoiseKind, Parameter, Report, Unit, Verdict};
 use nalgebra::{DMatrix, DVector};
@@ -38,6 +39,8 @@ pub struct Evidence {
     pub description: String,
     /// Whether it was rejected.
     pub rejected: bool,
+    /// Effects that its residuals show and its model lacks.
+    pub lacking: Vec<String>,
     /// SHA-256 of the recordings.
     pub recordings: BTreeSet<String>,
     /// Parameters, by column.
@@ -147,18 +150,34 @@ fn recordings(report: &Report) -> BTreeSet<String> {
 }
 
 /// Degrees of freedom of the noise: with levels of their own, the level that is known worst decides how heavy the tails are.
+///
+/// A level of the joints with share w of the noise of a pose has the relative error 1/(w √(2n)) from n poses, so that w²/ν, what it adds to
+/// 1/ν of the whole (Welch and Satterthwaite), is 1/n whatever its share: it counts with half its poses at least.
 fn degrees_of_freedom(info: &DataInformation, report: &Report) -> f64 {
     /// A level whose relative error is larger is nothing beside the others: nobody could see it.
     const NOTHING: f64 = 0.5;
+    let choice = report.noise_choice.as_ref();
+    let of_poses = choice.map_or(0.0, |choice| 0.5 * choice.poses as f64);
     let of_level = |noise: &calib_report::Noise| {
         let error = noise.relative_error?;
         let of_joints = matches!(noise.kind, NoiseKind::Joint | NoiseKind::Slide);
         let counts = error > 0.0 && (!of_joints || error < NOTHING);
         // σ̂ of ν degrees has the relative error 1 / √(2ν).
-        counts.then(|| 0.5 / error.powi(2))
+        let own = 0.5 / error.powi(2);
+        counts.then(|| if of_joints { own.max(of_poses) } else { own })
     };
     let levels = report.noise.iter().filter_map(of_level);
     levels.fold(info.degrees_of_freedom, f64::min)
+}
+
+/// The parameters that `missing-physics` names.
+fn lacking(report: &Report) -> Vec<String> {
+    let of = report
+        .findings
+        .iter()
+        .filter(|f| f.id == catalog::MISSING_PHYSICS);
+    let names = of.filter_map(|f| f.facts.get("parameter").and_then(Fact::word));
+    names.map(str::to_owned).collect()
 }
 
 /// Whether a parameter of this kind is a displacement from the nominal URDF; effects of joints are 0 in every URDF.
@@ -269,6 +288,7 @@ impl Evidence {
             robot: report.robot.clone(),
             description: description(report),
             rejected: report.verdict == Verdict::Rejected,
+            lacking: lacking(report),
             recordings: recordings(report),
             of_robot: parameters.iter().map(|p| p.joint.is_some()).collect(),
             parameters: info.parameters.clone(),

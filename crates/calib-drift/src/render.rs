@@ -95,6 +95,16 @@ pub fn text(drift: &Drift) -> String {
             drift.directions_not_credible
         ));
     }
+    let zeros = drift.known_in_neither.iter();
+    let zeros: Vec<&str> = zeros.filter_map(|n| n.strip_suffix(".offset")).collect();
+    if !zeros.is_empty() {
+        out.push('\n');
+        let text = format!(
+            "Not compared, because the recordings do not tell them from where robot, tracker and bodies stand: the zeros of {}.",
+            zeros.join(", ")
+        );
+        out += &terminal::wrapped(&text, "", "  ");
+    }
     if !drift.known_in_neither.is_empty() {
         out.push('\n');
         out += &terminal::wrapped(
@@ -120,6 +130,15 @@ fn warnings(drift: &Drift) -> String {
             "  ",
         );
     }
+    if drift.changed {
+        for (file, effects) in &drift.lacking {
+            let text = format!(
+                "the residuals of {file} show an effect that its model lacks ({}). In other postures it looks like a change of the robot, and the next lines may be that. Free it in both profiles and calibrate again before you trust them.",
+                effects.join(", ")
+            );
+            out += &terminal::wrapped(&text, "warning: ", "  ");
+        }
+    }
     for file in &drift.rejected {
         let text = format!(
             "{file} is of a rejected calibration: what its model does not explain, as a tracker that moved or an effect, looks like a change of the robot. Read its report first."
@@ -137,6 +156,9 @@ fn headline(drift: &Drift, significant: &[&Changed]) -> String {
             return format!("{}{remedy}", why.headline());
         }
         (None, false, _) => "NO SIGNIFICANT CHANGE\n",
+        (None, true, _) if !drift.lacking.is_empty() => {
+            "CHANGED, OR AN EFFECT THAT THE MODEL LACKS\n"
+        }
         (None, true, false) => "CHANGED\n",
         (None, true, true) => "CHANGED, and no single number shows where\n",
     };

@@ -1,5 +1,6 @@
 //! `calib predict`: where everything is, and how certain that is.
 
+use std::collections::BTreeSet;
 use std::path::Path;
 
 use calib_finding::cell;
@@ -36,7 +37,7 @@ pub struct PredictOptions {
 /// Predicted poses.
 #[derive(Debug, Clone)]
 pub struct Predicted {
-    /// CSV: one row for each row of the table, with its line; empty cells where a joint was lost.
+    /// CSV: one row for each row of the table, with its line; empty cells where a joint was lost, and for σ where it is not known.
     pub csv: String,
     /// Rows that were predicted.
     pub rows: usize,
@@ -44,6 +45,8 @@ pub struct Predicted {
     pub outside: usize,
     /// Joints that the table has no column for: they counted as 0.
     pub absent: Vec<String>,
+    /// Joints that no recording moved and that stand elsewhere in some rows: without σ there.
+    pub not_covered: Vec<String>,
     /// Temperature that was assumed, °C, because the table has none and lengths follow it.
     pub assumed_temperature_c: Option<f64>,
     /// Names that were asked for, or would have been given, that a link and a body or point have: the link's, and the other's here.
@@ -78,6 +81,7 @@ pub fn predict(
         absent: program.absent.clone(),
         assumed_temperature_c: program.assumed_temperature_c(&robot.model),
         renamed: renamed(robot, &places),
+        not_covered: Vec::new(),
     };
     let mut rows = Rows {
         robot,
@@ -85,6 +89,7 @@ pub fn predict(
         program: &program,
         approach: Approach::new(&robot.model),
         work: robot.model.work(),
+        not_covered: BTreeSet::new(),
     };
     for k in 0..program.q.len() {
         let wrong = |source: ModelError| ExportError::Row {
@@ -96,6 +101,8 @@ pub fn predict(
         out.rows += usize::from(scope.is_some());
         out.outside += usize::from(scope.is_some_and(|s| s != Scope::Inside));
     }
+    let name = |joint: &usize| robot.model.joints()[*joint].name.clone();
+    out.not_covered = rows.not_covered.iter().map(name).collect();
     out.csv = csv.text();
     Ok(out)
 }
@@ -156,6 +163,7 @@ struct Rows<'a> {
     program: &'a Program,
     approach: Approach,
     work: calib_model::Work,
+    not_covered: BTreeSet<usize>,
 }
 
 impl Rows<'_> {
@@ -166,7 +174,8 @@ impl Rows<'_> {
         places: &[(String, Place)],
         csv: &mut Csv,
     ) -> Result<Option<Scope>, ModelError> {
-        let model = &self.robot.model;
+        let robot = self.robot;
+        let model = &robot.model;
         let sigma = model.has_uncertainty();
         csv.cell(&self.program.lines[k].to_string());
         let held = match (self.options.torques, self.program.held.get(k)) {
@@ -211,9 +220,19 @@ impl Rows<'_> {
             pose.t.iter().for_each(|x| csv.number(Some(*x), 9));
             let turn = pose.isometry().rotation.coords;
             turn.iter().for_each(|x| csv.number(Some(*x), 12));
-            if let Some(covariance) = covariance {
-                let sigmas = sigmas(&covariance, &pose.r);
-                sigmas.iter().for_each(|x| csv.cell(&format!("{x:.3e}")));
+            let Some(covariance) = covariance else {
+                continue;
+            };
+            match model.not_covered(q, *place)? {
+                // What the axis of such a joint does there is in no covariance.
+                Some(joint) => {
+                    self.not_covered.insert(joint);
+                    SIGMA.iter().for_each(|_| csv.cell(""));
+                }
+                None => {
+                    let sigmas = sigmas(&covariance, &pose.r);
+                    sigmas.iter().for_each(|x| csv.cell(&format!("{x:.3e}")));
+                }
             }
         }
         csv.end();

@@ -1,17 +1,17 @@
 //! Links of all bodies and mistakes in the recordings, as facts, and the mistakes corrected.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 use calib_checks::structural::{
-    Chain, Correction, Decision, Hypothesis, JointIndex, Outcome, RecordingIndex, Scoped,
+    Chain, Correction, Decision, Hypothesis, Outcome, RecordingIndex, Scoped,
 };
-use calib_recording::Poses;
-use calib_urdf::{Joint, LinkId, RobotModel, doubt};
+use calib_urdf::{LinkId, RobotModel, doubt};
 
 use crate::correct;
 use crate::error::InitError;
 use crate::fact::{About, CERTAIN, Fact, Place, Residuals, Reversed, Rival};
 use crate::links::{Assigned, Choice, Scene, is_of_links};
+use crate::mirror::{is_or_mirrored, within_limits};
 use crate::mistake::Mistake;
 use crate::robot;
 use crate::session::Draft;
@@ -182,9 +182,17 @@ pub fn next_correction(
     let signs = of_signs(scene, assigned);
     if let Some((signs, left)) = &signs
         && signs.is_better_than(*left)
-        && let Some(by_signs) = context.by_signs(signs, limit)?
     {
-        return Ok(by_signs);
+        if is_or_mirrored(scene, &signs.best.correction, signs.best.rms, limit) {
+            let mirrored = vec![vec![Mistake::Mirrored]];
+            let fact =
+                context.sign_or_mirror(&signs.best.correction, signs.residuals(limit), mirrored);
+            next.facts.push(fact);
+            return Ok(next);
+        }
+        if let Some(by_signs) = context.by_signs(signs, limit)? {
+            return Ok(by_signs);
+        }
     }
     let Decision::Named(named) = &outcome.decision else {
         let about = unnamed(outcome, limit);
@@ -213,7 +221,7 @@ pub fn next_correction(
     let some_are = within.iter().any(|w| *w);
     let is_mirrored = |c: &Correction| c.iter().any(|s| s.hypothesis == Hypothesis::Mirrored);
     let mut possible = all.iter().zip(&within).filter(|(_, w)| **w || !some_are);
-    let is_or_mirrored = possible.any(|(c, _)| is_mirrored(c));
+    let is_named_mirrored = possible.any(|(c, _)| is_mirrored(c));
     for (i, correction) in all.iter().enumerate() {
         let another = i > 0 && (!is_of_tables(correction) || correction.len() > 1);
         if another || (some_are && !within[i]) {
@@ -223,16 +231,15 @@ pub fn next_correction(
         let others = others.map(|(_, c)| context.in_words(c));
         let others: Vec<Vec<Mistake>> = others.chain(as_good.iter().cloned()).collect();
         // Which of the two it is decides where the real robot moves: that is not ours to choose.
-        if is_or_mirrored && signs::is_of_signs(correction) {
-            next.facts.push(Fact::new(
-                Place::Recordings,
-                About::SignOrMirror {
-                    joints: context.reversed(correction),
-                    mistakes: context.in_words(correction),
-                    residuals,
-                    equivalent: others,
-                },
-            ));
+        if signs::is_of_signs(correction)
+            && (is_named_mirrored || is_or_mirrored(scene, correction, residuals.best, limit))
+        {
+            let mut others = others;
+            if !is_named_mirrored {
+                others.insert(0, vec![Mistake::Mirrored]);
+            }
+            let fact = context.sign_or_mirror(correction, residuals, others);
+            next.facts.push(fact);
             return Ok(next);
         }
         let evidence = (residuals, others.as_slice());
@@ -248,38 +255,6 @@ pub fn next_correction(
         next.sources = applied.sources;
     }
     Ok(next)
-}
-
-/// For each correction: whether the readings of the joints that any of them reverses are within the URDF's limits after it.
-fn within_limits(scene: &Scene<'_>, all: &[&Correction]) -> Vec<bool> {
-    let reversed = |correction: &Correction| -> BTreeSet<JointIndex> {
-        let joints = correction.iter().filter_map(|s| match s.hypothesis {
-            Hypothesis::Sign { joint } => Some(joint),
-            _ => None,
-        });
-        joints.collect()
-    };
-    let any: BTreeSet<JointIndex> = all.iter().flat_map(|c| reversed(c)).collect();
-    let inside =
-        |joint: &JointIndex, sign: f64| is_within(scene, &scene.model.joints()[joint.0], sign);
-    let of = |correction: &&Correction| {
-        let reversed = reversed(correction);
-        any.iter()
-            .all(|j| inside(j, if reversed.contains(j) { -1.0 } else { 1.0 }))
-    };
-    all.iter().map(of).collect()
-}
-
-/// Whether all readings of a joint, times this sign, are within its limits.
-fn is_within(scene: &Scene<'_>, joint: &Joint, sign: f64) -> bool {
-    /// rad or m, half a degree: readings at a limit may be beyond it by this, as where a profile is read.
-    const TOLERANCE: f64 = 0.009;
-    let Some((low, high)) = joint.limits.range() else {
-        return true;
-    };
-    let of = |poses: &Poses| poses.joints.get(&joint.name).cloned().unwrap_or_default();
-    let mut readings = scene.tables.iter().flat_map(of).flatten();
-    readings.all(|q| (low - TOLERANCE..=high + TOLERANCE).contains(&(sign * q)))
 }
 
 /// What is said where no mistake is named.
@@ -345,14 +320,25 @@ impl Context<'_> {
         correction.iter().filter_map(of).collect()
     }
 
+    /// Reversed joints that are not corrected, because something else explains the recordings as well.
+    fn sign_or_mirror(
+        &self,
+        correction: &Correction,
+        residuals: Residuals,
+        equivalent: Vec<Vec<Mistake>>,
+    ) -> Fact {
+        let about = About::SignOrMirror {
+            joints: self.reversed(correction),
+            mistakes: self.in_words(correction),
+            residuals,
+            equivalent,
+        };
+        Fact::new(Place::Recordings, about)
+    }
+
     /// The best pattern of signs as the correction; `None` where no column map can hold it.
     fn by_signs(&self, signs: &Signs, limit: Option<f64>) -> Result<Option<Next>, InitError> {
-        let residuals = Residuals {
-            none: signs.none,
-            best: signs.best.rms,
-            next: signs.next,
-            over: limit.filter(|limit| signs.best.rms > *limit),
-        };
+        let residuals = signs.residuals(limit);
         let others = signs.others.iter().map(|p| self.in_words(&p.correction));
         let others: Vec<Vec<Mistake>> = others.collect();
         let applied = apply_each(

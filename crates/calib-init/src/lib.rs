@@ -23,6 +23,7 @@ pub mod labels;
 pub mod limits;
 pub mod links;
 pub mod located;
+mod mirror;
 pub mod mistake;
 pub mod name;
 mod parts;

@@ -167,7 +167,7 @@ impl<'a> Scene<'a> {
     }
 
     /// Residual of a body on each group of links, rms, m, after a correction.
-    fn residuals(
+    pub(crate) fn residuals(
         &self,
         chain: &Chain,
         body: usize,

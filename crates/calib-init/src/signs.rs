@@ -9,6 +9,7 @@ use calib_checks::structural::{
 };
 use calib_urdf::{JointId, LinkId};
 
+use crate::fact::Residuals;
 use crate::links::{Assigned, Scene};
 
 /// Rows that the pairs are compared on.
@@ -111,6 +112,17 @@ fn places(scene: &Scene<'_>, assigned: &Assigned) -> Vec<Vec<(usize, LinkId)>> {
 }
 
 impl Signs {
+    /// What the best pattern explains, where errors of a nominal robot explain `limit`, m.
+    #[must_use]
+    pub fn residuals(&self, limit: Option<f64>) -> Residuals {
+        Residuals {
+            none: self.none,
+            best: self.best.rms,
+            next: self.next,
+            over: limit.filter(|limit| self.best.rms > *limit),
+        }
+    }
+
     /// The patterns that leave about as much as another correction does.
     #[must_use]
     pub fn like(&self, rms: f64) -> Vec<Correction> {

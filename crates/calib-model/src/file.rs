@@ -190,7 +190,7 @@ pub struct ModelJoint {
     pub limits: Option<[f64; 2]>,
     /// The joint whose reading it follows (a mimic joint): reading = multiplier · other + offset.
     pub mimic: Option<ModelMimic>,
-    /// Smallest and largest reading of the recordings that were fitted: nothing is verified outside; null where it was not moved.
+    /// Smallest and largest reading of the recordings that were fitted: nothing is verified outside; equal where it stood still, null where it moves nothing that was seen.
     pub fitted_range: Option<[f64; 2]>,
     /// Its effects, in the order of application.
     pub effects: Vec<ModelEffect>,

@@ -57,7 +57,7 @@ pub use approach::Approach;
 pub use correct::{Aim, Correction, Options, Outcome};
 pub use error::ModelError;
 pub use forward::{Under, Work};
-pub use model::{FindOutside, JointInfo, LinkId, Model, Place, Scope};
+pub use model::{FindOutside, JointInfo, LinkId, Model, Place, STOOD_STILL, Scope};
 pub use pose::Pose;
 
 /// The README's example is a test.

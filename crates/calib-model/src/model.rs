@@ -51,14 +51,27 @@ pub struct JointInfo {
     pub prismatic: bool,
     /// Limits of the URDF, rad or m.
     pub limits: Option<[f64; 2]>,
-    /// Smallest and largest reading that was fitted; `None` where it was not moved.
+    /// Smallest and largest reading that was fitted, equal where the joint stood still; `None` where it moves nothing that was seen.
     pub fitted_range: Option<[f64; 2]>,
 }
+
+impl JointInfo {
+    /// Where the joint stood in all recordings, if none moved it.
+    #[must_use]
+    pub fn stood_at(&self) -> Option<f64> {
+        self.fitted_range
+            .filter(|[low, high]| low == high)
+            .map(|[at, _]| at)
+    }
+}
+
+/// A joint that moves by no more stands still, rad or m: encoders flicker by less.
+pub const STOOD_STILL: f64 = 1e-3;
 
 /// Whether a posture lies where the model was fitted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scope {
-    /// All joints are in their fitted ranges; joints that were not moved are not looked at.
+    /// All joints are in their fitted ranges, and those that stood still are where they stood; joints that move nothing that was seen are not looked at.
     Inside,
     /// This joint (index in [`Model::joints`]) is outside of its fitted range: nothing was verified there.
     Outside(usize),
@@ -313,8 +326,27 @@ impl Model {
         if let Some((i, _)) = joints().find(|(_, (j, q))| outside(j.limits, **q)) {
             return Ok(Scope::BeyondLimits(i));
         }
-        let found = joints().find(|(_, (j, q))| outside(j.fitted_range, **q));
+        let beyond = |j: &JointInfo, q: f64| match j.stood_at() {
+            Some(at) => (q - at).abs() > STOOD_STILL,
+            None => outside(j.fitted_range, q),
+        };
+        let found = joints().find(|(_, (j, q))| beyond(j, **q));
         Ok(found.map_or(Scope::Inside, |(i, _)| Scope::Outside(i)))
+    }
+
+    /// A joint (index in [`Model::joints`]) before `place` that no recording moved and that stands elsewhere at `q`: where its axis is, was not
+    /// measured, and [`Model::sigma`] does not hold it. `q` as [`Model::joints`].
+    ///
+    /// # Errors
+    /// [`ModelError::Length`], [`ModelError::NotFinite`], [`ModelError::ForeignWork`].
+    pub fn not_covered(&self, q: &[f64], place: Place) -> Result<Option<usize>, ModelError> {
+        self.checked("q", q)?;
+        let (link, _) = self.fixed(place).ok_or(ModelError::ForeignWork)?;
+        let elsewhere = |i: &&usize| {
+            let at = self.moved[**i].stood_at();
+            at.is_some_and(|at| (q[**i] - at).abs() > STOOD_STILL)
+        };
+        Ok(self.leading[link].iter().find(elsewhere).copied())
     }
 
     /// Length and finiteness of a slice in the order of [`Model::joints`].

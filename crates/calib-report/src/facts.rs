@@ -79,6 +79,13 @@ pub enum NextStep {
         /// The file with the joint effects that a URDF cannot hold, where there are any.
         effects: Option<String>,
     },
+    /// Use the model file: the URDF is no better without the joint effects that it cannot hold.
+    UseModel {
+        /// The file.
+        model: String,
+        /// The URDF that was fitted to be used without the effects, where it is better than the untouched one.
+        alone: Option<String>,
+    },
     /// Nothing of the URDF changed.
     KeepUrdf {
         /// The file with what was found: where bodies and tracker are.

@@ -70,6 +70,11 @@ pub(crate) fn span(data: &Data, joint: JointIndex) -> f64 {
     if high >= low { high - low } else { 0.0 }
 }
 
+/// A joint that is recorded turns further, rad (3°).
+const LEAST_TURN: f64 = 0.05;
+/// A joint that is recorded slides further, m.
+const LEAST_WAY: f64 = 2e-3;
+
 fn of_readings(data: &Data, scopes: &[Scope], list: &mut Vec<Candidate>) {
     use UnitMistake::*;
     let joints = data.relevant_joints();
@@ -86,8 +91,11 @@ fn of_readings(data: &Data, scopes: &[Scope], list: &mut Vec<Candidate>) {
             } else {
                 [MillimetersReadAsMeters, MetersReadAsMillimeters]
             };
+            // A unit that leaves a joint hardly any motion says that it stood still: that is another mistake.
+            let least = if revolute { LEAST_TURN } else { LEAST_WAY };
             units
                 .into_iter()
+                .filter(|unit| unit.factor() > 1.0 || span(data, joint) * unit.factor() > least)
                 .for_each(|mistake| add(Hypothesis::Unit { joint, mistake }));
         }
         // Of an empty column it is asked where the joint stood.

@@ -83,6 +83,13 @@ pub fn run(console: &Console, options: &Predict) -> Result<ExitCode, CliError> {
             );
             say_note(console, &note);
         }
+        if !done.not_covered.is_empty() {
+            let note = format!(
+                "no recording moved {}: where they stand elsewhere, how far the prediction is off is not known, and the cells of σ are empty",
+                done.not_covered.join(", ")
+            );
+            say_note(console, &note);
+        }
     }
     write(console, options.out.as_ref(), &done.csv)
 }

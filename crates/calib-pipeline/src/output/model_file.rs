@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use calib_core::EffectKind;
 use calib_core::effect::{Drives, Source};
 use calib_geometry::se3;
+use calib_model::STOOD_STILL;
 use calib_model::file::{
     Input, ModelBody, ModelEffect, ModelJoint, ModelLink, ModelMimic, ModelMotion, ModelNumber,
     ModelPlugin, ModelPoint, ModelPose, ModelUncertainty, ModelValidity, RobotModelFile,
@@ -224,7 +225,7 @@ fn plugin(inputs: &Inputs, id: JointId, kind: EffectKind) -> Option<ModelPlugin>
     })
 }
 
-/// Smallest and largest reading of the fitted rows, where the joint moved.
+/// Smallest and largest reading of the fitted rows; of a joint that stood still its one position, if something that was seen depends on it.
 pub(super) fn fitted_range(inputs: &Inputs, id: JointId) -> Option<[f64; 2]> {
     let fitted = inputs.recordings.values();
     let fitted = fitted.filter(|r| r.spec.usage != Usage::Validation);
@@ -236,7 +237,18 @@ pub(super) fn fitted_range(inputs: &Inputs, id: JointId) -> Option<[f64; 2]> {
         .fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| {
             (l.min(q), h.max(q))
         });
-    (high > low).then_some([low, high])
+    if high - low > STOOD_STILL {
+        return Some([low, high]);
+    }
+    let middle = (low + high) / 2.0;
+    let profile = &inputs.robot.profile;
+    let bodies = profile.bodies.values().map(|b| b.link);
+    let mut links = bodies.chain(profile.points.values().map(|p| p.link));
+    let carries = links.any(|link| {
+        let mut chain = model.chain(model.root(), link).into_iter();
+        chain.any(|step| step.joint == id)
+    });
+    (middle.is_finite() && carries).then_some([middle, middle])
 }
 
 fn bodies(inputs: &Inputs, robot: &Calibration) -> BTreeMap<String, ModelBody> {

@@ -8,6 +8,7 @@ use calib_report::{
 use crate::output::evidence::Evidence;
 use crate::output::export::calibration_name;
 use crate::output::files::alone_name;
+use crate::output::model_file::model_name;
 use crate::output::of_data::missing_finding;
 use crate::verify::motions::Motions;
 
@@ -129,11 +130,19 @@ pub(crate) fn next_steps(
     let unchanged = e.urdf.changes.is_empty() && effects_file(e).is_none();
     let no_better = ReasonId::NotBetterThanRegistration;
     let gains = !judgment.reasons.iter().any(|r| r.id == no_better);
+    let alone_gains = e.held_out.is_none_or(HeldOut::urdf_alone_gains);
     let mut steps = vec![match judgment.verdict {
         Verdict::Accepted | Verdict::AcceptedWithWarnings if unchanged => NextStep::KeepUrdf {
             scene: e.inputs.robot.profile.outputs.scene.clone(),
         },
         Verdict::Accepted | Verdict::AcceptedWithWarnings if !gains => NextStep::NothingGained,
+        Verdict::Accepted | Verdict::AcceptedWithWarnings if !alone_gains => NextStep::UseModel {
+            model: model_name(&e.inputs.robot.profile.outputs.urdf),
+            alone: e
+                .held_out
+                .filter(|held_out| held_out.urdf_refitted_gains())
+                .map(|_| alone_name(&e.inputs.robot.profile.outputs.urdf)),
+        },
         Verdict::Accepted | Verdict::AcceptedWithWarnings => NextStep::Use {
             urdf: e.inputs.robot.profile.outputs.urdf.clone(),
             effects: effects_file(e),

@@ -29,7 +29,7 @@ class Joint:
     limits: tuple[float, float] | None
     """Of the URDF, rad or m."""
     fitted_range: tuple[float, float] | None
-    """Smallest and largest reading that was fitted; ``None`` where it was not moved."""
+    """Smallest and largest reading that was fitted, equal where it stood still; ``None`` where it moves nothing that was seen."""
 
 
 class Outcome(enum.IntEnum):

@@ -72,6 +72,24 @@ pub struct HeldOut {
 }
 
 impl HeldOut {
+    /// Whether the patched URDF predicts better than the untouched one also without the joint effects that it cannot hold.
+    #[must_use]
+    pub fn urdf_alone_gains(&self) -> bool {
+        match (self.urdf_alone, self.registration_only) {
+            (Some(alone), Some(untouched)) => alone.rms_m < untouched.rms_m,
+            _ => true,
+        }
+    }
+
+    /// The same of the URDF that was fitted to be used without effects.
+    #[must_use]
+    pub fn urdf_refitted_gains(&self) -> bool {
+        match (self.urdf_refitted, self.registration_only) {
+            (Some(refitted), Some(untouched)) => refitted.rms_m < untouched.rms_m,
+            _ => false,
+        }
+    }
+
     /// Summarize the poses: [`ErrorStats`] per model over the poses that have it, the expected error with its 95 % interval, the worst pose.
     ///
     /// Screened errors are counted and left out of every statistic but `with_screened`.

@@ -38,7 +38,7 @@ pub struct SceneJoint {
     pub axis: Option<[f64; 3]>,
     /// Lowest and highest position, rad or m; null where there are none.
     pub limits: Option<[f64; 2]>,
-    /// Lowest and highest position that was recorded for the calibration, rad or m; null where it did not move.
+    /// Lowest and highest position that was recorded for the calibration, rad or m: equal where it stood still, null where it moves nothing that was seen.
     pub fitted_range: Option<[f64; 2]>,
     /// The joint that it follows.
     pub mimic: Option<ModelMimic>,

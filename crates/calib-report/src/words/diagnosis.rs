@@ -3,7 +3,7 @@
 use super::prose::{code, full_stop};
 use crate::budget::Budget;
 use crate::shell_path;
-use crate::{Diagnosis, Output, ReasonId, Report, Unit, Verdict, number};
+use crate::{Diagnosis, HeldOut, Output, ReasonId, Report, Unit, Verdict, number};
 
 /// Multiples of the tracker's noise that a limit of the rms error should leave room for.
 const ROOM: f64 = 1.5;
@@ -244,7 +244,9 @@ pub(crate) fn apply(report: &Report, results: &str, urdf: &str) -> Option<String
         Verdict::Accepted | Verdict::AcceptedWithWarnings
     );
     let no_better = ReasonId::NotBetterThanRegistration;
-    let gains = !report.changes.is_empty() && !report.reason_ids.contains(&no_better);
+    let held_out = report.verification.held_out.as_ref();
+    let alone = held_out.is_none_or(HeldOut::urdf_alone_gains);
+    let gains = alone && !report.changes.is_empty() && !report.reason_ids.contains(&no_better);
     let [results, urdf] = [results, urdf].map(shell_path);
     (accepted && gains).then(|| format!("calib apply {results} {urdf} --diff"))
 }

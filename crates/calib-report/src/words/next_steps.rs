@@ -14,6 +14,15 @@ impl NextStep {
                     with.map_or_else(String::new, |file| format!(" with the effects in `{file}`"));
                 format!("Use `{urdf}`{with}, and keep this folder: `calib revert` needs it.")
             }
+            Self::UseModel { model, alone } => {
+                let alone = alone.as_ref();
+                let alone = alone.map_or_else(String::new, |file| {
+                    format!(" A program that reads a URDF only is better off with `{file}`, which was fitted to be used without them.")
+                });
+                format!(
+                    "Use the model file `{model}` (`calib predict`, `calib correct`), not the calibrated URDF: without the joint effects that a URDF cannot hold it predicts new poses no better than the untouched one.{alone}"
+                )
+            }
             Self::KeepUrdf { scene } => format!(
                 "Keep the URDF: nothing of the robot itself was estimated. `{scene}` has where bodies and tracker are."
             ),
