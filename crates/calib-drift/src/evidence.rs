@@ -4,10 +4,11 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use calib_finding::{Fact, catalog};
 use calib_geometry::decompose;
-use calib_report::{DataInformation, NoiseKind, Parameter, Report, Unit, Verdict};
+use calib_report::{DataInformation, Parameter, Report, Unit, Verdict};
 use nalgebra::{DMatrix, DVector};
 
 use crate::error::DriftError;
+use crate::freedom::degrees_of_freedom;
 
 /// A number whose change is of interest: gradient in the evidence's parameters.
 #[derive(Debug, Clone, PartialEq)]
@@ -147,27 +148,6 @@ fn recordings(report: &Report) -> BTreeSet<String> {
             .any(|ext| i.path.ends_with(&format!(".{ext}")))
     });
     recorded.map(|i| i.sha256.clone()).collect()
-}
-
-/// Degrees of freedom of the noise: with levels of their own, the level that is known worst decides how heavy the tails are.
-///
-/// A level of the joints with share w of the noise of a pose has the relative error 1/(w √(2n)) from n poses, so that w²/ν, what it adds to
-/// 1/ν of the whole (Welch and Satterthwaite), is 1/n whatever its share: it counts with half its poses at least.
-fn degrees_of_freedom(info: &DataInformation, report: &Report) -> f64 {
-    /// A level whose relative error is larger is nothing beside the others: nobody could see it.
-    const NOTHING: f64 = 0.5;
-    let choice = report.noise_choice.as_ref();
-    let of_poses = choice.map_or(0.0, |choice| 0.5 * choice.poses as f64);
-    let of_level = |noise: &calib_report::Noise| {
-        let error = noise.relative_error?;
-        let of_joints = matches!(noise.kind, NoiseKind::Joint | NoiseKind::Slide);
-        let counts = error > 0.0 && (!of_joints || error < NOTHING);
-        // σ̂ of ν degrees has the relative error 1 / √(2ν).
-        let own = 0.5 / error.powi(2);
-        counts.then(|| if of_joints { own.max(of_poses) } else { own })
-    };
-    let levels = report.noise.iter().filter_map(of_level);
-    levels.fold(info.degrees_of_freedom, f64::min)
 }
 
 /// The parameters that `missing-physics` names.

@@ -14,6 +14,8 @@
 //! large just when the distance is: with 7 and 53 degrees and p = 4, 1.7 % of the distances exceed the limit of 1 %. So its share counts as large
 //! as it is 1.5 standard errors above its estimate, `log (w / (1 − w)) + 1.5 √(2/ν₁ + 2/ν₂)`; then 0.7 to 1.1 % exceed it, from 7 degrees up.
 
+use calib_report::{DataInformation, Noise, NoiseKind, Report};
+
 /// Standard errors by which the share of the noise that is known worse is raised.
 const RAISED: f64 = 1.5;
 
@@ -42,6 +44,27 @@ pub(crate) fn combined(shares: &[f64], first: f64, second: f64) -> f64 {
     let p = shares.len() as f64;
     let uncertain = sums(&|w| w) / first + sums(&|w| 1.0 - w) / second;
     ((p * p + p) / uncertain).max(1.0)
+}
+
+/// Degrees of freedom of the noise: with levels of their own, the level that is known worst decides how heavy the tails are.
+///
+/// A level of the joints with share w of the noise of a pose has the relative error 1/(w √(2n)) from n poses, so that w²/ν, what it adds to
+/// 1/ν of the whole (Welch and Satterthwaite), is 1/n whatever its share: it counts with half its poses at least.
+pub(crate) fn degrees_of_freedom(info: &DataInformation, report: &Report) -> f64 {
+    /// A level whose relative error is larger is nothing beside the others: nobody could see it.
+    const NOTHING: f64 = 0.5;
+    let choice = report.noise_choice.as_ref();
+    let of_poses = choice.map_or(0.0, |choice| 0.5 * choice.poses as f64);
+    let of_level = |noise: &Noise| {
+        let error = noise.relative_error?;
+        let of_joints = matches!(noise.kind, NoiseKind::Joint | NoiseKind::Slide);
+        let counts = error > 0.0 && (!of_joints || error < NOTHING);
+        // σ̂ of ν degrees has the relative error 1 / √(2ν).
+        let own = 0.5 / error.powi(2);
+        counts.then(|| if of_joints { own.max(of_poses) } else { own })
+    };
+    let levels = report.noise.iter().filter_map(of_level);
+    levels.fold(info.degrees_of_freedom, f64::min)
 }
 
 #[cfg(test)]

@@ -39,10 +39,7 @@ pub fn text(drift: &Drift) -> String {
         "- ",
         "  ",
     );
-    let moved = match drift.undecided {
-        Some(_) => "What differs",
-        None => "What moved",
-    };
+    let moved = heading(drift);
     section(&mut out, moved, &free);
     section(
         &mut out,
@@ -95,16 +92,7 @@ pub fn text(drift: &Drift) -> String {
             drift.directions_not_credible
         ));
     }
-    let zeros = drift.known_in_neither.iter();
-    let zeros: Vec<&str> = zeros.filter_map(|n| n.strip_suffix(".offset")).collect();
-    if !zeros.is_empty() {
-        out.push('\n');
-        let text = format!(
-            "Not compared, because the recordings do not tell them from where robot, tracker and bodies stand: the zeros of {}.",
-            zeros.join(", ")
-        );
-        out += &terminal::wrapped(&text, "", "  ");
-    }
+    out += &zeros_not_compared(drift);
     if !drift.known_in_neither.is_empty() {
         out.push('\n');
         out += &terminal::wrapped(
@@ -118,6 +106,35 @@ pub fn text(drift: &Drift) -> String {
         );
     }
     out
+}
+
+/// Over the numbers that changed.
+fn heading(drift: &Drift) -> &'static str {
+    match drift.undecided {
+        Some(_) => "What differs",
+        None => "What moved",
+    }
+}
+
+/// The joints whose zeros no number holds; of others the angle between their neighbors does.
+fn zeros_not_compared(drift: &Drift) -> String {
+    let is_compared = |joint: &&str| {
+        let own = [format!("zero.{joint}"), format!("{joint}.offset")];
+        drift.numbers.iter().any(|n| own.contains(&n.name))
+    };
+    let zeros = drift
+        .known_in_neither
+        .iter()
+        .filter_map(|n| n.strip_suffix(".offset"));
+    let zeros: Vec<&str> = zeros.filter(|joint| !is_compared(joint)).collect();
+    if zeros.is_empty() {
+        return String::new();
+    }
+    let text = format!(
+        "Not compared by themselves, because the recordings do not tell them from where robot, tracker and bodies stand: the zeros of {}.",
+        zeros.join(", ")
+    );
+    format!("\n{}", terminal::wrapped(&text, "", "  "))
 }
 
 /// What makes the answer another one than that about the robot.

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use calib_checks::rigid_body::rigid_groups;
+use calib_checks::rigid_body::rigid_groups_of_files;
 use calib_recording::{BodyStream, ColumnMap, Filled, MarkerStream};
 use calib_urdf::RobotModel;
 use nalgebra::Point3;
@@ -42,7 +42,7 @@ pub fn bodies(
     known: &BTreeSet<String>,
 ) -> (Vec<Found>, Vec<Fact>) {
     let mut facts = Vec::new();
-    let mut tracks = tracks(sources);
+    let (mut tracks, begins) = tracks(sources);
     facts.extend(seldom(&mut tracks));
     facts.extend(duplicates(&mut tracks));
     facts.extend(labels::in_tracks(&mut tracks));
@@ -55,7 +55,7 @@ pub fn bodies(
     let mut found = Vec::new();
     let mut noise: Option<(f64, usize)> = None;
     let mut calculated = false;
-    for group in rigid_groups(&slices, None)
+    for group in rigid_groups_of_files(&slices, None, &begins)
         .iter()
         .flat_map(|g| seen_together(g, &slices))
     {
@@ -110,7 +110,7 @@ fn streams(sources: &[Source]) -> impl Iterator<Item = &BodyStream> {
 }
 
 /// All markers, file after file.
-fn tracks(sources: &[Source]) -> BTreeMap<String, Track> {
+fn tracks(sources: &[Source]) -> (BTreeMap<String, Track>, Vec<usize>) {
     let labeled = |m: &&MarkerStream| !m.unlabeled;
     let all = sources.iter().flat_map(|s| &s.recording.markers);
     let names: BTreeSet<&String> = all.filter(labeled).map(|m| &m.name).collect();
@@ -118,18 +118,21 @@ fn tracks(sources: &[Source]) -> BTreeMap<String, Track> {
         .into_iter()
         .map(|name| (name.clone(), Track::new()))
         .collect();
+    let (mut begins, mut all_rows) = (Vec::new(), 0);
     for source in sources {
         let markers = &source.recording.markers;
         let most = markers.iter().map(|m| m.samples.len()).max().unwrap_or(0);
         let stride = most / ROWS + 1;
         let rows = most.div_ceil(stride);
+        begins.push(all_rows);
+        all_rows += rows;
         for (name, track) in &mut tracks {
             let marker = markers.iter().find(|m| m.name == *name && !m.unlabeled);
             let at = |row: usize| marker?.samples.get(row * stride)?.point(Filled::Exclude);
             track.extend((0..rows).map(at));
         }
     }
-    tracks
+    (tracks, begins)
 }
 
 /// Removes markers that hardly any row shows.

@@ -22,6 +22,10 @@ const STIFF: f64 = 2e-3;
 const PLAUSIBLE_NOISE: f64 = 5e-3;
 /// Spread of a pair, in units of its noise, up to which it is noise: that of four rows, the fewest, exceeds it once in a thousand.
 const NOISY: f64 = 2.5;
+/// Spread of a distance in a file that only a joint makes, m: a marker that slips, or a bad row in five, stays below.
+const OF_A_JOINT: f64 = 0.01;
+/// Rows that two markers must share in such a file.
+const ROWS_OF_A_FILE: usize = 8;
 /// Rows that two markers must share to be distinguished.
 const MIN_ROWS: usize = 4;
 
@@ -30,12 +34,23 @@ const MIN_ROWS: usize = 4;
 /// Two markers that are never seen together are not distinguished by their own distance. `sigma`: noise of a coordinate, m, where it is stated.
 #[must_use]
 pub fn rigid_groups(tracks: &[&[Option<Point3<f64>>]], sigma: Option<f64>) -> Vec<Vec<usize>> {
+    rigid_groups_of_files(tracks, sigma, &[])
+}
+
+/// The same of several files, one after the other, which begin at these rows: a joint that moves two bodies in one file only shows them apart there.
+#[must_use]
+pub fn rigid_groups_of_files(
+    tracks: &[&[Option<Point3<f64>>]],
+    sigma: Option<f64>,
+    begins: &[usize],
+) -> Vec<Vec<usize>> {
     let n = tracks.len();
     let mut spread = vec![vec![0.0; n]; n];
     let (mut extent, mut stiffest) = (0.0_f64, f64::INFINITY);
     for j in 0..n {
         for k in 0..j {
             if let Some((median, wide)) = distance(tracks[j], tracks[k]) {
+                let wide = wide.max(moved_in_a_file(tracks[j], tracks[k], begins));
                 spread[j][k] = wide;
                 spread[k][j] = wide;
                 extent = extent.max(median);
@@ -72,6 +87,21 @@ pub fn rigid_groups(tracks: &[&[Option<Point3<f64>>]], sigma: Option<f64>) -> Ve
     groups
 }
 
+/// The largest spread within a file, where it is that of a joint.
+fn moved_in_a_file(a: &[Option<Point3<f64>>], b: &[Option<Point3<f64>>], begins: &[usize]) -> f64 {
+    let end = a.len().min(b.len());
+    let ends = begins.iter().skip(1).copied().chain([end]);
+    let files = begins.iter().zip(ends);
+    let of_file = |(begin, end): (&usize, usize)| {
+        let rows = (*begin).min(end)..end;
+        let shared = rows.clone().filter(|i| a[*i].is_some() && b[*i].is_some());
+        let enough = shared.count() >= ROWS_OF_A_FILE;
+        let (_, wide) = distance(&a[rows.clone()], &b[rows]).filter(|_| enough)?;
+        Some(wide).filter(|wide| *wide > OF_A_JOINT)
+    };
+    files.filter_map(of_file).fold(0.0, f64::max)
+}
+
 /// Median and spread of the distance of two markers.
 fn distance(a: &[Option<Point3<f64>>], b: &[Option<Point3<f64>>]) -> Option<(f64, f64)> {
     let mut lengths: Vec<f64> = a
@@ -91,7 +121,7 @@ fn distance(a: &[Option<Point3<f64>>], b: &[Option<Point3<f64>>]) -> Option<(f64
 
 #[cfg(test)]
 mod tests {
-    use super::rigid_groups;
+    use super::{rigid_groups, rigid_groups_of_files};
     use nalgebra::{Point3, Rotation3, Vector3};
 
     /// Two bodies of three markers about one axis; the second turns in `turning` of 20 rows.
@@ -143,6 +173,32 @@ mod tests {
                 "{shake}"
             );
         }
+    }
+
+    #[test]
+    fn a_joint_that_moves_in_one_file_only_shows_two_bodies() {
+        // Ten of a hundred rows.
+        let mut tracks = hinge(0, 1e-4);
+        let moving = hinge(10, 1e-4);
+        for (track, moving) in tracks.iter_mut().zip(&moving) {
+            let still = track.clone();
+            (0..3).for_each(|_| track.extend(still.iter().copied()));
+            track.extend(moving[..10].iter().copied());
+        }
+        let slices: Vec<&[Option<Point3<f64>>]> = tracks.iter().map(Vec::as_slice).collect();
+        assert_eq!(rigid_groups(&slices, None).len(), 1);
+        let begins = [0, 20, 40, 60, 80];
+        assert_eq!(rigid_groups_of_files(&slices, None, &begins).len(), 2);
+        // A file in which a marker slipped by a centimeter splits nothing.
+        let mut slipped = hinge(0, 1e-4);
+        slipped[2]
+            .iter_mut()
+            .skip(10)
+            .flatten()
+            .for_each(|p| p.x += 0.01);
+        let slices: Vec<&[Option<Point3<f64>>]> = slipped.iter().map(Vec::as_slice).collect();
+        let apart = rigid_groups(&slices, None).len();
+        assert_eq!(rigid_groups_of_files(&slices, None, &[0]).len(), apart);
     }
 
     #[test]

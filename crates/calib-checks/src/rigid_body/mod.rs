@@ -26,6 +26,6 @@ mod pose;
 pub use computed::computed_below;
 pub(crate) use computed::decimal_grid;
 pub use gross::Distances;
-pub use groups::rigid_groups;
+pub use groups::{rigid_groups, rigid_groups_of_files};
 pub use learn::{MarkerFit, NotABody, Template};
 pub use pose::{BodyPoses, RowPose, WithoutPose, body_from_markers, body_poses};
