@@ -8,7 +8,7 @@ use calib_recording::joint_column;
 
 use crate::error::ExportError;
 use crate::read::Robot;
-use crate::starts::Starts;
+use crate::starts::{LEVER, Starts};
 use crate::table::{Csv, NOTES, program};
 
 /// Rows at which it is asked how well the model knows where the tool stands.
@@ -128,20 +128,20 @@ pub fn correct(
                 Some(known) => known,
                 None => Starts::of(model, tool, &mut work).map_err(wrong)?,
             };
-            let with = options.within(Options::inverse());
-            let mut other = command.clone();
-            for start in known.near(pose, with.aim) {
-                let to = (&mut work, &mut other[..]);
-                let tried = model.ik(pose, start, tool, &with, &under, to);
-                let tried = tried.map_err(wrong)?;
-                if is_there(&tried) {
-                    command.copy_from_slice(&other);
-                    done = tried;
-                    out.elsewhere += 1;
-                    break;
-                }
-            }
+            let near = known.near(pose, options.within(Options::inverse()).aim);
+            let from = |start: &[f64], other: &mut [f64]| {
+                let with = options.within(Options::inverse());
+                model.ik(pose, start, tool, &with, &under, (&mut work, other))
+            };
+            let is_other = nearest(&near, from, (&mut done, &mut command));
+            out.elsewhere += usize::from(is_other.map_err(wrong)?);
             starts = Some(known);
+            // From none of them the tool came there: where it ended says nothing of the pose.
+            if matches!(done.outcome, Outcome::Nearer) && is_elsewhere(&done) {
+                command.copy_from_slice(&seed);
+                (done.after_m, done.after_rad) = (done.before_m, done.before_rad);
+                done.outcome = Outcome::NotReached;
+            }
         }
         out.count(&done);
         if k % every == 0 && model.has_uncertainty() {
@@ -160,6 +160,45 @@ pub fn correct(
 
 fn is_there(done: &Correction) -> bool {
     matches!(done.outcome, Outcome::Reached | Outcome::OutOfScope(_))
+}
+
+/// Replaces the command by the one that ends nearest to the pose, from these starts; whether it did and the tool is there, or nearly.
+fn nearest<F>(
+    starts: &[&[f64]],
+    mut from: F,
+    (done, command): (&mut Correction, &mut Vec<f64>),
+) -> Result<bool, ModelError>
+where
+    F: FnMut(&[f64], &mut [f64]) -> Result<Correction, ModelError>,
+{
+    let mut other = command.clone();
+    let mut replaced = false;
+    for start in starts {
+        let tried = from(start, &mut other)?;
+        // A pose that the real robot just misses, its arm stretched, is reached from nowhere: the nearest counts.
+        let nearer = tried.outcome == Outcome::Nearer && away(&tried) < away(done);
+        if is_there(&tried) || nearer {
+            command.copy_from_slice(&other);
+            replaced = true;
+            *done = tried;
+        }
+        if is_there(done) {
+            break;
+        }
+    }
+    Ok(replaced && !is_elsewhere(done))
+}
+
+/// How far the tool is from its pose, m: a rotation by 1 rad counts as by [`LEVER`].
+fn away(done: &Correction) -> f64 {
+    done.after_m + LEVER * done.after_rad
+}
+
+/// A tool that is further from a pose than this is nowhere near it, m and rad (1°).
+const NEAR: (f64, f64) = (5e-3, 0.0175);
+
+fn is_elsewhere(done: &Correction) -> bool {
+    done.after_m > NEAR.0 || done.after_rad > NEAR.1
 }
 
 impl CorrectOptions {

@@ -7,12 +7,12 @@ use calib_model::{Aim, Model, ModelError, Place, Pose, Under, Work};
 
 /// Postures that are known.
 const POSTURES: usize = 1024;
-/// Of them, those that are tried for a pose.
-const TRIED: usize = 16;
+/// Of them, those that are tried for a pose; most poses need one or two.
+const TRIED: usize = 128;
 /// Bases of the sequence, one for each joint; more joints use them again from another point on.
 const PRIMES: [usize; 12] = [2, 3, 5, 7, 11, 13, 17, 19, 23, 29, 31, 37];
 /// m per rad.
-const LEVER: f64 = 0.3;
+pub(crate) const LEVER: f64 = 0.3;
 /// Half the range of a joint without limits, rad; of one that slides, m.
 const HALF: (f64, f64) = (std::f64::consts::PI, 0.5);
 

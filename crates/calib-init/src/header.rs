@@ -81,7 +81,7 @@ impl Header {
     }
 }
 
-/// Reads the header line ([`locate`]), the row of units below it, and the first rows;
+/// Reads the header line (of whatever place), the row of units below it, and the first rows;
 /// `None` where there is no such table.
 #[must_use]
 pub fn header(bytes: &[u8]) -> Option<Header> {

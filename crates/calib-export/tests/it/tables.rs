@@ -287,3 +287,66 @@ fn poses_without_joints_are_reached_from_anywhere() {
     let done = correct(&robot, &path, &bounded).expect("corrected");
     assert!(done.elsewhere == 0 && done.reached < rows, "{done:?}");
 }
+
+/// Poses just beyond the reach of the stretched arm: the commands stand where the arm comes nearest, from wherever the row before it was. Poses that the
+/// arm comes nowhere near are refused.
+#[test]
+fn poses_that_are_just_missed_are_approached_and_far_ones_are_refused() {
+    let robot = arm();
+    let model = &robot.model;
+    let folder = tempfile::tempdir().expect("a folder");
+    let tool = model.last_link();
+    let name = &model.links()[tool.index()];
+    let mut work = model.work();
+    let mut pose = |k: usize| {
+        let joints = model.joints().iter().enumerate();
+        let q: Vec<f64> = joints
+            .map(|(j, joint)| {
+                let [low, high] = joint.fitted_range.or(joint.limits).expect("a range");
+                let step = [0.618_034, 0.754_878, 0.569_840][j % 3];
+                low + (high - low) * (0.11 * j as f64 + k as f64 * step).fract()
+            })
+            .collect();
+        model
+            .forward(&q, &Under::default(), &mut work)
+            .expect("finite");
+        let pose = model.root_from(tool.into(), &work).expect("a link");
+        pose.isometry()
+    };
+    let mut all: Vec<_> = (0..4000).map(&mut pose).collect();
+    all.sort_by(|a, b| {
+        let far = |p: &nalgebra::Isometry3<f64>| p.translation.vector.norm();
+        far(b).total_cmp(&far(a))
+    });
+    // Rows that are far from each other stand between them.
+    let between: Vec<_> = (0..12).map(|k| pose(7 * k + 3)).collect();
+    let text = |beyond: f64| {
+        let header =
+            format!("{name}.x_m,{name}.y_m,{name}.z_m,{name}.qx,{name}.qy,{name}.qz,{name}.qw\n");
+        let rows = all.iter().take(12).zip(&between).flat_map(|(far, other)| {
+            let mut far = *far;
+            let out = far.translation.vector.normalize() * beyond;
+            far.translation.vector += out;
+            [*other, far]
+        });
+        let row = |p: nalgebra::Isometry3<f64>| {
+            let numbers = p.translation.vector.iter().chain(p.rotation.coords.iter());
+            let cells: Vec<String> = numbers.map(|v| format!("{v:.12}")).collect();
+            cells.join(",") + "\n"
+        };
+        header + &rows.map(row).collect::<String>()
+    };
+    let options = CorrectOptions {
+        tool: Some(name.clone()),
+        ..CorrectOptions::default()
+    };
+    let missed = correct(&robot, &table(&folder, &text(2e-3)), &options).expect("corrected");
+    assert_eq!((missed.rows, missed.refused), (24, 0), "{missed:?}");
+    assert!(missed.after_m[1] < 5e-3, "{missed:?}");
+    let far = correct(&robot, &table(&folder, &text(3.0)), &options).expect("corrected");
+    assert_eq!(
+        (far.reached, far.nearer, far.refused),
+        (12, 0, 12),
+        "{far:?}"
+    );
+}
