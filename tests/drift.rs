@@ -185,6 +185,25 @@ fn a_longer_forearm_is_found_and_the_rest_is_not() {
         .expect(0)
         .json();
     assert!(itself["joint"]["statistic"].as_f64().expect("a number") < 1e-9);
+    // Beside an effect that a model lacks the change may be that effect.
+    let mut report = dir.json("longer/report.json");
+    let lacks = serde_json::json!({
+        "id": "missing-physics", "severity": "warning", "subject": "fit", "rows": [], "text": "", "remedy": "", "about": {"kind": "fit"},
+        "facts": {"kind": "effect", "parameter": "elbow.gain"},
+    });
+    let findings = report["findings"].as_array_mut().expect("a list");
+    findings.push(lacks);
+    let dir = dir.file("lacking/report.json", report.to_string());
+    let said = dir.calib(["drift", "old", "lacking"]).expect(1);
+    let words = said.words();
+    assert!(
+        words.contains("CHANGED, OR AN EFFECT THAT THE MODEL LACKS"),
+        "{words}"
+    );
+    assert!(
+        words.contains("its model lacks (elbow.gain)") && words.contains("lacking/report.json"),
+        "{words}"
+    );
 }
 
 #[test]

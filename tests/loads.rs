@@ -213,6 +213,22 @@ fn the_urdf_fitted_without_effects_predicts_better_than_the_one_whose_effects_ar
     let refitted = rms("urdf_refitted");
     assert!(rms("calibrated") < refitted, "{refitted}");
     assert!(refitted < 0.9 * rms("urdf_alone"), "{refitted}");
+    // Without its effects the calibrated URDF is worse than the untouched one: nobody is told to apply it.
+    assert!(rms("urdf_alone") > rms("registration_only"));
+    let step = report["next_steps"][0].as_str().expect("a step");
+    for file in ["`arm.calibrated.model.json`", "`arm.calibrated.alone.urdf`"] {
+        assert!(step.contains(file), "{step}");
+    }
+    let told = dir.calib(["run", "arm.yaml", "--out", "out2"]);
+    assert!(!told.stdout.contains("calib apply"), "{}", told.stdout);
+    let applied = dir.calib(["apply", "out", "arm.urdf", "--diff"]);
+    let said = applied.words()
+        + &applied
+            .stderr
+            .split_whitespace()
+            .collect::<Vec<_>>()
+            .join(" ");
+    assert!(said.contains("use it with the effects only"), "{said}");
     // As a robot of its own, with nothing free but where it stands, the file does what was stated of it.
     let alone = dir.read("out/arm.calibrated.alone.urdf");
     let registered = heavy.replace(", joint_offsets, joint_axes, compliance", "");
