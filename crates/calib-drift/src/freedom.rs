@@ -51,25 +51,44 @@ pub(crate) fn combined(shares: &[f64], first: f64, second: f64) -> f64 {
 /// A level of the joints with share w of the noise of a pose has the relative error 1/(w √(2n)) from n poses, so that w²/ν, what it adds to
 /// 1/ν of the whole (Welch and Satterthwaite), is 1/n whatever its share: it counts with half its poses at least.
 pub(crate) fn degrees_of_freedom(info: &DataInformation, report: &Report) -> f64 {
-    /// A level whose relative error is larger is nothing beside the others: nobody could see it.
-    const NOTHING: f64 = 0.5;
     let choice = report.noise_choice.as_ref();
-    let of_poses = choice.map_or(0.0, |choice| 0.5 * choice.poses as f64);
-    let of_level = |noise: &Noise| {
-        let error = noise.relative_error?;
-        let of_joints = matches!(noise.kind, NoiseKind::Joint | NoiseKind::Slide);
-        let counts = error > 0.0 && (!of_joints || error < NOTHING);
-        // σ̂ of ν degrees has the relative error 1 / √(2ν).
-        let own = 0.5 / error.powi(2);
-        counts.then(|| if of_joints { own.max(of_poses) } else { own })
-    };
-    let levels = report.noise.iter().filter_map(of_level);
+    let poses = choice.map_or(0, |choice| choice.poses);
+    let of = |noise: &Noise| of_level(noise.kind, noise.relative_error?, poses);
+    let levels = report.noise.iter().filter_map(of);
     levels.fold(info.degrees_of_freedom, f64::min)
+}
+
+/// Degrees of freedom of a level of this relative error from so many poses; `None` where the level does not count.
+fn of_level(kind: NoiseKind, error: f64, poses: usize) -> Option<f64> {
+    /// A level of the joints whose relative error is larger is nothing beside the others: nobody could see it.
+    const NOTHING: f64 = 0.5;
+    // σ̂ of ν degrees has the relative error 1 / √(2ν).
+    let own = 0.5 / error.powi(2);
+    match kind {
+        _ if error <= 0.0 => None,
+        NoiseKind::Joint | NoiseKind::Slide if error >= NOTHING => None,
+        NoiseKind::Joint | NoiseKind::Slide => Some(own.max(0.5 * poses as f64)),
+        _ => Some(own),
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_small_level_of_the_joints_counts_with_half_its_poses() {
+        // 45 % from 320 poses: 2.4 degrees of its own.
+        assert_eq!(of_level(NoiseKind::Joint, 0.4537, 320), Some(160.0));
+        let position = of_level(NoiseKind::Position, 0.4537, 320).expect("counts");
+        assert!((position - 2.43).abs() < 0.01, "{position}");
+        // That from which all of a pose's noise comes: √(1/(2n)) from n poses.
+        let error = (0.5_f64 / 12.0).sqrt();
+        let large = of_level(NoiseKind::Slide, error, 12).expect("counts");
+        assert!((large - 12.0).abs() < 1e-9, "{large}");
+        assert_eq!(of_level(NoiseKind::Joint, 0.51, 320), None);
+        assert_eq!(of_level(NoiseKind::Position, 0.0, 320), None);
+    }
 
     #[test]
     fn it_lies_between_the_smaller_and_the_sum() {

@@ -116,7 +116,7 @@ fn heading(drift: &Drift) -> &'static str {
     }
 }
 
-/// The joints whose zeros no number holds; of others the angle between their neighbors does.
+/// The joints whose zeros are not compared; those of the others are angles between their neighbors.
 fn zeros_not_compared(drift: &Drift) -> String {
     let is_compared = |joint: &&str| {
         let own = [format!("zero.{joint}"), format!("{joint}.offset")];
@@ -131,7 +131,7 @@ fn zeros_not_compared(drift: &Drift) -> String {
         return String::new();
     }
     let text = format!(
-        "Not compared by themselves, because the recordings do not tell them from where robot, tracker and bodies stand: the zeros of {}.",
+        "Not compared: the zeros of {}, which the recordings do not distinguish from the places of robot, tracker and bodies.",
         zeros.join(", ")
     );
     format!("\n{}", terminal::wrapped(&text, "", "  "))
@@ -147,10 +147,10 @@ fn warnings(drift: &Drift) -> String {
             "  ",
         );
     }
-    if drift.changed {
+    if drift.changed || drift.undecided.is_some() {
         for (file, effects) in &drift.lacking {
             let text = format!(
-                "the residuals of {file} show an effect that its model lacks ({}). In other postures it looks like a change of the robot, and the next lines may be that. Free it in both profiles and calibrate again before you trust them.",
+                "the residuals of {file} show an effect that its model lacks ({}). In other postures it looks like a change of the robot. Free it in both profiles and calibrate again before you trust the following lines.",
                 effects.join(", ")
             );
             out += &terminal::wrapped(&text, "warning: ", "  ");

@@ -85,7 +85,7 @@ pub fn run(console: &Console, options: &Predict) -> Result<ExitCode, CliError> {
         }
         if !done.not_covered.is_empty() {
             let note = format!(
-                "no recording moved {}: where they stand elsewhere, how far the prediction is off is not known, and the cells of σ are empty",
+                "no recording moved {}: where one of these joints stands elsewhere, the uncertainty is not known, and the cells of σ are empty",
                 done.not_covered.join(", ")
             );
             say_note(console, &note);

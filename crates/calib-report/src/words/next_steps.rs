@@ -17,7 +17,7 @@ impl NextStep {
             Self::UseModel { model, alone } => {
                 let alone = alone.as_ref();
                 let alone = alone.map_or_else(String::new, |file| {
-                    format!(" A program that reads a URDF only is better off with `{file}`, which was fitted to be used without them.")
+                    format!(" Where a program reads only a URDF, use `{file}`, which was fitted to be used without them.")
                 });
                 format!(
                     "Use the model file `{model}` (`calib predict`, `calib correct`), not the calibrated URDF: without the joint effects that a URDF cannot hold it predicts new poses no better than the untouched one.{alone}"
