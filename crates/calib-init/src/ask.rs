@@ -1,6 +1,6 @@
 //! Links of all bodies and mistakes in the recordings, as facts, and the mistakes corrected.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_checks::structural::{
     Chain, Correction, Decision, Hypothesis, Outcome, RecordingIndex, Scoped,
@@ -27,6 +27,8 @@ pub struct Asked {
     pub choices: BTreeMap<usize, Choice>,
     /// The assignment that explains the recordings best.
     pub assigned: Assigned,
+    /// Bodies whose links a person named.
+    pub stated: Vec<usize>,
 }
 
 /// Asks for links and mistakes; a body on the stated link, if one is stated, and bodies of a profile that is edited (`fixed`) on theirs.
@@ -38,6 +40,7 @@ pub fn ask(scene: &Scene<'_>, stated: Option<LinkId>, fixed: &[(usize, LinkId)])
             on: Vec::new(),
             outcome: None,
         },
+        stated: Vec::new(),
     };
     // A model that was read is a tree.
     let Ok(chain) = Chain::from_model(scene.model) else {
@@ -66,6 +69,7 @@ pub fn ask(scene: &Scene<'_>, stated: Option<LinkId>, fixed: &[(usize, LinkId)])
     Asked {
         choices: choices.into_iter().collect(),
         assigned,
+        stated: stated.iter().map(|(body, _)| *body).collect(),
     }
 }
 
@@ -195,7 +199,7 @@ pub fn next_correction(
         }
     }
     let Decision::Named(named) = &outcome.decision else {
-        let about = unnamed(outcome, limit);
+        let about = unnamed(outcome, limit, || scene.rms_of_all(&assigned.on));
         next.facts
             .extend(about.map(|about| Fact::new(Place::Recordings, about)));
         return Ok(next);
@@ -257,14 +261,34 @@ pub fn next_correction(
     Ok(next)
 }
 
-/// What is said where no mistake is named.
-fn unnamed(outcome: &Outcome, limit: Option<f64>) -> Option<About> {
+/// What is said where no mistake is named; `of_all`: the residual with the outliers.
+fn unnamed(
+    outcome: &Outcome,
+    limit: Option<f64>,
+    of_all: impl Fn() -> Option<f64>,
+) -> Option<About> {
     let (rms, rows) = (outcome.rms, outcome.rows);
+    let screened: BTreeSet<usize> = outcome.screened.iter().map(|s| s.row).collect();
+    let matters = !screened.is_empty() && of_all() > limit;
     let agrees = About::Agrees {
         rms,
         rows,
+        not: if matters { screened.len() } else { 0 },
         corrected: false,
     };
+    if let Some(jump) = &outcome.jump {
+        let residuals = Residuals {
+            none: of_all().unwrap_or(rms),
+            best: jump.rms,
+            next: None,
+            over: None,
+        };
+        return Some(About::NotCorrected {
+            mistake: Mistake::Other,
+            residuals,
+            equivalent: Vec::new(),
+        });
+    }
     match &outcome.decision {
         // Where the robot's errors explain nothing, the limit is the noise that was assumed, and the tracker's may be larger.
         Decision::Undecided { leading: None, .. }

@@ -133,6 +133,13 @@ pub enum About {
         /// The link.
         link: String,
     },
+    /// Joints whose values change while no body moves with them.
+    Unfollowed {
+        /// Their names, root first.
+        joints: Vec<String>,
+        /// A body that may be mounted beyond one of them, if that joint stood still.
+        body: Option<String>,
+    },
     /// Nothing that the recordings moved carries the body.
     Still {
         /// The link.
@@ -360,6 +367,8 @@ pub enum About {
         rms: f64,
         /// Poses.
         rows: usize,
+        /// Those of them that do not.
+        not: usize,
         /// After the corrections that stand beside it.
         corrected: bool,
     },

@@ -38,6 +38,7 @@ pub mod tables;
 pub mod terminal;
 mod tracked;
 mod turns;
+mod unfollowed;
 mod unread;
 mod unrecorded;
 pub mod words;

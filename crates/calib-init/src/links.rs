@@ -318,6 +318,14 @@ impl<'a> Scene<'a> {
         explain(&data, &options).ok()
     }
 
+    /// Residual of all rows that hypotheses are asked about, rms, m, outliers among them.
+    #[must_use]
+    pub fn rms_of_all(&self, on: &[(usize, LinkId)]) -> Option<f64> {
+        let chain = Chain::from_model(self.model).ok()?;
+        let data = thin(&self.data(&chain, on), ROWS_OF_HYPOTHESES);
+        registration_residual(&data).ok()
+    }
+
     /// The assignment that explains the recordings best after its correction, among the links that bodies follow best and the ends of the chains.
     /// Each body's own choice comes first and wins a tie.
     #[must_use]
@@ -401,6 +409,10 @@ impl Assigned {
     /// Nothing stands out, and errors of a nominal robot explain what is left.
     fn settled(&self) -> bool {
         self.outcome.as_ref().is_none_or(|outcome| {
+            // A change at one row leaves the links as they are.
+            if outcome.jump.is_some() {
+                return true;
+            }
             let consistent = matches!(
                 outcome.decision,
                 Decision::Consistent { .. } | Decision::TooFewData { .. }
@@ -426,6 +438,8 @@ impl Assigned {
     /// The residual after the correction, m.
     fn left(&self) -> f64 {
         let rms = self.outcome.as_ref().map_or(f64::INFINITY, |o| o.rms);
+        let jump = self.outcome.as_ref().and_then(|o| o.jump.as_ref());
+        let rms = jump.map_or(rms, |jump| jump.rms);
         self.named().map_or(rms, |named| named.evidence.best)
     }
 }

@@ -22,6 +22,7 @@ use crate::session::{self, Draft};
 use crate::source::{File, Source};
 use crate::tables;
 use crate::turns;
+use crate::unfollowed;
 use crate::unrecorded;
 
 /// What the caller knows.
@@ -241,6 +242,7 @@ fn with_recordings(
             proposal.bodies[*body].link = *link;
         }
         of_links = asked.facts(&scene, stated, &fixed);
+        of_links.extend(unfollowed::fact(&scene, &asked.assigned.on, &asked.stated));
         let next = next_correction(&scene, &sources, &drafts, &asked.assigned)?;
         corrections.extend(next.facts);
         let Some(new) = next.sources.filter(|_| corrections.len() <= CORRECTIONS) else {

@@ -84,6 +84,7 @@ pub fn sentence(about: &About) -> String {
         | About::LinkStated { .. }
         | About::Link { .. }
         | About::LinkUnknown { .. }
+        | About::Unfollowed { .. }
         | About::Still { .. } => of_links(about),
         About::JointsByName { .. }
         | About::JointsByOrder { .. }
@@ -100,16 +101,9 @@ pub fn sentence(about: &About) -> String {
         About::Agrees {
             rms,
             rows,
+            not,
             corrected,
-        } => format!(
-            "{} agree with the nominal robot: {} fit it to {} rms, and no mistake explains them better.",
-            match corrected {
-                true => "With the corrections below, order, signs and units of the joints",
-                false => "Order, signs and units of the joints",
-            },
-            plural(*rows, "pose", "poses"),
-            mm(*rms)
-        ),
+        } => agree(*rms, *rows, *not, *corrected),
         About::TooFew { rows } => format!(
             "{} too few to test the order, signs and units of the joints.",
             plural(*rows, "pose is", "poses are")
@@ -132,6 +126,23 @@ pub fn sentence(about: &About) -> String {
         | About::InventedMount
         | About::StatedSigma { .. } => known::sentence(about),
         _ => of_session(about),
+    }
+}
+
+fn agree(rms: f64, rows: usize, not: usize, corrected: bool) -> String {
+    let what = match corrected {
+        true => "With the corrections below, order, signs and units of the joints",
+        false => "Order, signs and units of the joints",
+    };
+    let (poses, rms) = (plural(rows, "pose", "poses"), mm(rms));
+    match not {
+        0 => format!(
+            "{what} agree with the nominal robot: {poses} fit it to {rms} rms, and no mistake explains them better."
+        ),
+        not => format!(
+            "{what} agree with the nominal robot in {} of {poses} only, which fit it to {rms} rms; the others do not fit it. See what `calib check` says.",
+            rows - not
+        ),
     }
 }
 
@@ -186,6 +197,7 @@ fn of_links(about: &About) -> String {
         About::LinkUnknown { link } => format!(
             "No pose shows this body together with moving joints. `{link}` is the last link that recorded joints move: name the link that carries it."
         ),
+        About::Unfollowed { joints, body } => unfollowed(joints, body.as_deref()),
         About::Still { link, rms } => {
             format!(
                 "The body stands still to {} rms: it is fixed to `{link}`, or stands beside the robot.",
@@ -193,6 +205,29 @@ fn of_links(about: &About) -> String {
             )
         }
         _ => String::new(),
+    }
+}
+
+fn unfollowed(joints: &[String], body: Option<&str>) -> String {
+    let names = quoted(joints);
+    let (one, it) = match joints.len() {
+        1 => ("it", "the joint"),
+        _ => ("one of them", "that joint"),
+    };
+    match body {
+        Some(body) => format!(
+            "The values of {names} change, and no body moves with {}. If `{body}` is mounted beyond {one}, {it} stood still: check the joint and its column.",
+            if joints.len() == 1 { "it" } else { "them" },
+        ),
+        None => format!(
+            "The values of {names} change, and no body moves with {}: the recordings show nothing of {}.",
+            if joints.len() == 1 { "it" } else { "them" },
+            if joints.len() == 1 {
+                "this joint"
+            } else {
+                "these joints"
+            },
+        ),
     }
 }
 

@@ -188,6 +188,7 @@ impl DataCheck {
                 catalog::JOINT_GAIN,
                 catalog::JOINT_COLUMN_MISSING,
                 catalog::WRONG_MOUNT,
+                catalog::CHANGED_WHILE_RECORDING,
                 catalog::TRACKER_MOVED,
                 catalog::TRACKER_SCALE,
                 catalog::BODY_REMOUNTED,

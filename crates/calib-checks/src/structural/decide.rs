@@ -12,8 +12,9 @@ use super::few;
 use super::further::{Leads, Signs, further};
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{JointIndex, SampleIndex};
-use super::jump::jump;
+use super::jump::{Jump, jump};
 use super::likelihood::{Opinion, errors_explain, has_unknowns, opinion};
+use super::lost::lost_rows;
 use super::naming::{Asked, EQUIVALENT_WITHIN, on_twin};
 use super::outcome::{Correction, Decision, Design, Named, Options, Outcome};
 use super::pairs::name_pair;
@@ -198,11 +199,17 @@ fn beyond_hypotheses(
             }
         }
         Decision::Named(named)
-            if named.evidence.ratio < options.pair_ratio || is_of_sizes(named) =>
+            if named.evidence.ratio < options.pair_ratio
+                || is_of_sizes(named)
+                || is_of_rows(named) =>
         {
             let ratio = named.evidence.ratio;
             let most = clearly_below(named.evidence.best, outcome, options);
-            if let Some(found) = jump(data, outcome, most, options) {
+            let lost = || {
+                let corrected = is_of_rows(named).then(|| apply_all(&named.correction, data))?;
+                behind_outliers((data, &corrected), screened, outcome, options)
+            };
+            if let Some(found) = lost().or_else(|| jump(data, outcome, most, options)) {
                 outcome.jump = Some(found);
                 outcome.decision = undecided(None, ratio);
             } else if let Some(found) = better_than(named, data, outcome, options) {
@@ -212,6 +219,12 @@ fn beyond_hypotheses(
         }
         // What looks like a gain of the whole joint may be a change of its zero at one row.
         Decision::Consistent { ratio, .. } => {
+            if let Some(found) = behind_outliers((data, data), screened, outcome, options) {
+                outcome.decision = undecided(None, *ratio);
+                outcome.continuous = None;
+                outcome.jump = Some(found);
+                return;
+            }
             if let Some(found) = &outcome.continuous {
                 let whole = Scoped {
                     hypothesis: found.hypothesis,
@@ -233,9 +246,28 @@ fn beyond_hypotheses(
     }
 }
 
+/// Rows that were lost, where all that follow, or all before them once the others are paired, are outliers for that reason.
+fn behind_outliers(
+    (data, corrected): (&Data, &Data),
+    screened: &[SampleIndex],
+    outcome: &Outcome,
+    options: &Options,
+) -> Option<Jump> {
+    let limit = outcome.expected?.limit;
+    let of_all = (!screened.is_empty()).then(|| Scan::new(corrected, &[]).none().rms);
+    let of_all = of_all.filter(|rms| *rms > limit)?;
+    lost_rows(data, outcome, of_all / options.name_ratio.powi(2))
+}
+
 /// A zero, a gain or a share takes up much of a change at one row.
 fn is_of_sizes(named: &Named) -> bool {
     named.correction.iter().any(|s| s.hypothesis.is_sized())
+}
+
+/// Rows that are lost in the middle of a recording make all later ones look shifted.
+fn is_of_rows(named: &Named) -> bool {
+    let mut all = named.correction.iter();
+    all.any(|s| matches!(s.hypothesis, Hypothesis::RowShift { .. }))
 }
 
 /// What a change at one row may leave beside another explanation, m: less than that by the ratio that names a hypothesis, and than
@@ -326,6 +358,8 @@ fn decide(asked: &Asked<'_>, outcome: &Outcome) -> Decision {
     let few = few_samples(asked.data, asked.screened);
     let single = best.filter(|_| best_ratio >= options.name_ratio * few);
     let single = single.map(|best| asked.with_expected(asked.name(best)));
+    // Ten times as large, what a small motion leaves is what a robot's errors do to one ten times as small.
+    let single = single.filter(|named| !is_of_unit(named) || is_explained(named));
     // Two at once are a pair, where something stands out.
     let axes = several_axes(asked).map(|axes| asked.with_expected(axes));
     let better_than_pairs = |axes: &Named| match axes.correction.len() {
@@ -388,10 +422,19 @@ fn decide(asked: &Asked<'_>, outcome: &Outcome) -> Decision {
 
 /// Nothing stands out after the correction, and nominal errors explain what is left, or the name is beyond doubt anyway.
 fn settled(named: &Named, options: &Options) -> bool {
+    named.verified(options) && is_explained(named)
+}
+
+/// Nominal errors explain what is left, or the name is beyond doubt anyway.
+fn is_explained(named: &Named) -> bool {
     /// Wrong names among pairs of faults had ratios up to 3.5 and left more than nominal errors explain.
     const BEYOND_DOUBT: f64 = 5.0;
-    let explained = named.within_expected != Some(false) || named.evidence.ratio >= BEYOND_DOUBT;
-    named.verified(options) && explained
+    named.within_expected != Some(false) || named.evidence.ratio >= BEYOND_DOUBT
+}
+
+fn is_of_unit(named: &Named) -> bool {
+    let mut all = named.correction.iter();
+    all.any(|s| matches!(s.hypothesis, Hypothesis::TrackerUnit { .. }))
 }
 
 /// The name is another link, and the unit of the tracker alone does nearly as well.

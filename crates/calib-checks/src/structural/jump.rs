@@ -1,4 +1,5 @@
-//! Did the tracker, a body on its link or the zero of a joint move at one row, and too far for a fit to find it? Or were two bodies exchanged there?
+//! Did the tracker, a body on its link or the zero of a joint move at one row, and too far for a fit to find it? Or were two bodies exchanged there,
+//! or rows of one table [lost](super::lost)?
 //!
 //! Asked where the data disagree with the robot and nothing is named. Sums over rows add up, so every place at which a recording
 //! may be cut costs two registrations: of the rows before and of those after, with a tracker and markers of their own,
@@ -21,6 +22,7 @@ use super::correct::same_shape;
 use super::data::Data;
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{BodyIndex, JointIndex, RecordingIndex};
+use super::lost::lost_rows;
 use super::moments::{Moments, Normal};
 use super::scan::{Fit, Scan};
 use super::special::{estimated, rigid_motion};
@@ -57,6 +59,11 @@ pub enum Moved {
         second: BodyIndex,
         /// From the row on, or up to it.
         after: bool,
+    },
+    /// Nothing: rows of one table were lost there, and from there on readings and tracker data are paired otherwise.
+    Rows {
+        /// What belongs to a row stands this many rows earlier among the readings; negative: later.
+        by: i8,
     },
 }
 
@@ -124,7 +131,11 @@ pub(super) fn jump(all: &Data, outcome: &Outcome, most: f64, options: &Options) 
         }
     }
     let explains = |jump: &Jump| jump.rms <= limit.min(most);
-    best.filter(explains)
+    let best = best.filter(explains);
+    match lost_rows(all, outcome, most) {
+        Some(lost) if best.as_ref().is_none_or(|b| lost.rms < b.rms) => Some(lost),
+        _ => best,
+    }
 }
 
 /// Empty columns are 0 in their own recording; in a group with others they would be missing.
@@ -169,7 +180,10 @@ fn cut(scan: &Scan<'_>, recording: usize) -> Option<Cut> {
 }
 
 /// The sums of each channel over the rows up to each.
-fn running<'r>(scan: &Scan<'_>, rows: impl Iterator<Item = &'r usize>) -> Vec<Vec<Moments>> {
+pub(super) fn running<'r>(
+    scan: &Scan<'_>,
+    rows: impl Iterator<Item = &'r usize>,
+) -> Vec<Vec<Moments>> {
     let (n, bodies) = (scan.channels.len(), scan.data.bodies.len());
     let mut sums = vec![Moments::ZERO; n];
     let mut all = Vec::new();
@@ -187,7 +201,7 @@ fn running<'r>(scan: &Scan<'_>, rows: impl Iterator<Item = &'r usize>) -> Vec<Ve
 }
 
 /// Weighted sum of squared residuals of one registration of the parts, m².
-fn residual(parts: &[&[Moments]]) -> f64 {
+pub(super) fn residual(parts: &[&[Moments]]) -> f64 {
     let mut normal = Normal::new();
     for k in 0..parts[0].len() {
         let mut total = Moments::ZERO;
@@ -220,6 +234,8 @@ fn moved_at(data: &Data, cut: &Cut, outcome: &Outcome, options: &Options) -> Opt
                     second,
                     after,
                 } => exchanged(&grouped, (first, second), after),
+                // These are looked for by sums of their own.
+                Moved::Rows { .. } => (f64::INFINITY, Size::default()),
             };
             (moved, rms, size)
         });

@@ -65,6 +65,7 @@ mod ids;
 mod jump;
 mod likelihood;
 mod linear;
+mod lost;
 mod mirror;
 mod moments;
 mod moved;
@@ -107,7 +108,7 @@ pub use outcome::{
     Allowing, Correction, Decision, Design, Evidence, Expected, Named, Options, Outcome,
 };
 pub use readings::WrongReadings;
-pub use registration::{PointRows, Registered, registration};
+pub use registration::{PointRows, Registered, registration, registrations};
 pub use rounding::{Rounding, by_rounding_alone, rounding};
 pub use rows::{Deviation, Deviations, deviations};
 pub use thinning::thin;

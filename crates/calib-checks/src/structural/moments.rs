@@ -254,6 +254,17 @@ impl Normal {
         self.reduced().of_rotation.at(&super::rotation::vec9(q))
     }
 
+    /// All minima over the rotations, the best first.
+    pub(crate) fn minima(&self) -> Vec<Registration> {
+        let reduced = self.reduced();
+        let all = reduced.of_rotation.minima().into_iter();
+        let with_c = |(q, f)| {
+            let c = reduced.translation(&super::rotation::vec9(&q));
+            Registration { q, c, f }
+        };
+        all.map(with_c).collect()
+    }
+
     /// Eliminates c and minimizes over the rotations.
     pub(crate) fn solve(&self) -> Registration {
         let reduced = self.reduced();

@@ -3,7 +3,7 @@
 use nalgebra::{Isometry3, Matrix3, Point3, Rotation3, Translation3, UnitQuaternion, Vector3};
 
 use super::chain::Pose;
-use super::moments::{Moments, Normal, Placed};
+use super::moments::{Moments, Normal, Placed, Registration};
 
 /// The best registration, equation (2) of [`structural`](super), and one to compare it with.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -23,36 +23,73 @@ pub type PointRows = Vec<(Isometry3<f64>, Point3<f64>)>;
 /// `None` without rows.
 #[must_use]
 pub fn registration(points: &[PointRows], other: &Isometry3<f64>) -> Option<Registered> {
-    let rows = || points.iter().flatten();
-    let count = rows().count();
-    if count == 0 {
-        return None;
-    }
-    // Relative to the mean position, so that the translation does not swamp the rest.
-    let mean = rows().map(|(_, y)| y.coords).sum::<Vector3<f64>>() / count as f64;
-    let mut normal = Normal::new();
-    for point in points {
-        let mut moments = Moments::ZERO;
-        for (root_from_link, y) in point {
-            let link = Pose {
-                r: root_from_link.rotation.to_rotation_matrix().into_inner(),
-                t: root_from_link.translation.vector,
-            };
-            moments.add(&(y.coords - mean), &Placed::from(&link), 1.0);
-        }
-        normal.include(&moments);
-    }
-    let found = normal.solve();
-    let rotation = UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(found.q));
-    let translation = Translation3::from(found.c - rotation * mean);
-    let root_from_tracker = Isometry3::from_parts(translation, rotation);
+    let summed = Summed::of(points)?;
+    let found = summed.normal.solve();
     let inverse: Matrix3<f64> = other.rotation.inverse().to_rotation_matrix().into_inner();
-    let rms = |f: f64| (f.max(0.0) / count as f64).sqrt();
     Some(Registered {
-        tracker_from_root: root_from_tracker.inverse(),
-        rms: rms(found.f),
-        rms_of_other: rms(normal.at(&inverse)),
+        tracker_from_root: summed.tracker_from_root(&found),
+        rms: summed.rms(found.f),
+        rms_of_other: summed.rms(summed.normal.at(&inverse)),
     })
+}
+
+/// All registrations with less residual than those around them: `tracker_from_root` and rms, m, the best first. Points that move little leave several.
+#[must_use]
+pub fn registrations(points: &[PointRows]) -> Vec<(Isometry3<f64>, f64)> {
+    let Some(summed) = Summed::of(points) else {
+        return Vec::new();
+    };
+    let all = summed.normal.minima().into_iter();
+    all.map(|found| (summed.tracker_from_root(&found), summed.rms(found.f)))
+        .collect()
+}
+
+/// Rows of points as sums, relative to their mean position, so that the translation does not swamp the rest.
+struct Summed {
+    normal: Normal,
+    mean: Vector3<f64>,
+    count: usize,
+}
+
+impl Summed {
+    /// `None` without rows.
+    fn of(points: &[PointRows]) -> Option<Self> {
+        let rows = || points.iter().flatten();
+        let count = rows().count();
+        if count == 0 {
+            return None;
+        }
+        let mean = rows().map(|(_, y)| y.coords).sum::<Vector3<f64>>() / count as f64;
+        let mut normal = Normal::new();
+        for point in points {
+            let mut moments = Moments::ZERO;
+            for (root_from_link, y) in point {
+                let link = Pose {
+                    r: root_from_link.rotation.to_rotation_matrix().into_inner(),
+                    t: root_from_link.translation.vector,
+                };
+                moments.add(&(y.coords - mean), &Placed::from(&link), 1.0);
+            }
+            normal.include(&moments);
+        }
+        Some(Self {
+            normal,
+            mean,
+            count,
+        })
+    }
+
+    fn tracker_from_root(&self, found: &Registration) -> Isometry3<f64> {
+        let rotation = Rotation3::from_matrix_unchecked(found.q);
+        let rotation = UnitQuaternion::from_rotation_matrix(&rotation);
+        let translation = Translation3::from(found.c - rotation * self.mean);
+        Isometry3::from_parts(translation, rotation).inverse()
+    }
+
+    /// Root mean square of residuals, m, from their sum of squares.
+    fn rms(&self, f: f64) -> f64 {
+        (f.max(0.0) / self.count as f64).sqrt()
+    }
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use calib_geometry::decompose::symmetric_eigen_small;
 use calib_geometry::so3;
-use nalgebra::{Matrix3, SMatrix, SVector, Vector3};
+use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
 
 /// Nine columns of Q, one below the other.
 pub(crate) type Vec9 = SVector<f64, 9>;
@@ -14,6 +14,15 @@ const MAX_STEPS: usize = 12;
 const SMALL_STEP: f64 = 1e-9;
 /// Starts from the cube that are refined beside the linear one: two miss no best minimum of 2 400, one misses 0.5 %.
 const CUBE_STARTS: usize = 2;
+
+/// A half turn that costs no more than this many times the best is tried: another minimum is near it.
+const COMPARABLE: f64 = 10.0;
+/// Rotations between two minima at which f is looked at.
+const BETWEEN: u32 = 8;
+/// Minima closer than this are one, rad.
+const NEAR: f64 = 0.2;
+/// By this f rises between two minima, at the least.
+const RISE: f64 = 1.02;
 
 /// `f(Q) = qᵀ A q + 2 bᵀ q + d` with `q = vec Q`, columns first.
 #[derive(Debug, Clone, Copy)]
@@ -47,7 +56,53 @@ impl Quadratic {
                 best = found;
             }
         }
+        for turned in self.half_turns(&best.0) {
+            if self.at(&vec9(&turned)) < COMPARABLE * best.1 {
+                let found = self.newton(turned);
+                if found.1 < best.1 {
+                    best = found;
+                }
+            }
+        }
         (best.0, best.1.max(0.0))
+    }
+
+    /// The rotation turned by 180° about the axes of the curvatures of f: of points that move by little, these have minima of their own.
+    fn half_turns(&self, r: &Matrix3<f64>) -> [Matrix3<f64>; 3] {
+        let axes = symmetric_eigen_small(&self.slopes(r).1).vectors;
+        [0, 1, 2].map(|k| {
+            let axis = axes.column(k);
+            r * (axis * axis.transpose() * 2.0 - Matrix3::identity())
+        })
+    }
+
+    /// The rotations of least f in their surroundings, each behind a rise of f from every better one, the best first.
+    pub(crate) fn minima(&self) -> Vec<(Matrix3<f64>, f64)> {
+        let best = self.minimum().0;
+        let starts = cube().map(|r| best * r);
+        let mut all: Vec<(Matrix3<f64>, f64)> = starts.map(|start| self.newton(start)).collect();
+        all.sort_by(|x, y| x.1.total_cmp(&y.1));
+        let mut kept: Vec<(Matrix3<f64>, f64)> = Vec::new();
+        for (r, f) in all {
+            if kept.iter().all(|(other, _)| self.rises_between(other, &r)) {
+                kept.push((r, f.max(0.0)));
+            }
+        }
+        kept
+    }
+
+    /// Whether f rises between two rotations above both; along a valley it does not.
+    fn rises_between(&self, first: &Matrix3<f64>, second: &Matrix3<f64>) -> bool {
+        let between = Rotation3::from_matrix_unchecked(first.tr_mul(second)).scaled_axis();
+        let at = |part: f64| {
+            let turned = so3::exp(&(between * part))
+                .to_rotation_matrix()
+                .into_inner();
+            self.at(&vec9(&(first * turned)))
+        };
+        let highest = (1..BETWEEN).map(|k| at(f64::from(k) / f64::from(BETWEEN)));
+        let highest = highest.fold(f64::NEG_INFINITY, f64::max);
+        between.norm() > NEAR && highest > RISE * at(0.0).max(at(1.0)).max(0.0)
     }
 
     /// The unconstrained minimum `−(A + εI)⁻¹ b`.
@@ -70,27 +125,32 @@ impl Quadratic {
         Some(rotation.to_rotation_matrix().into_inner())
     }
 
+    /// Half of the first and second derivatives of f by δ of `Q exp δ`.
+    fn slopes(&self, r: &Matrix3<f64>) -> (Vector3<f64>, Matrix3<f64>) {
+        let slope = self.a * vec9(r) + self.b;
+        // ∂vec(Q exp δ)/∂δ: column block a is −Q [e_a]ₓ
+        let mut j = SMatrix::<f64, 9, 3>::zeros();
+        for a in 0..3 {
+            let e = Vector3::ith(a, 1.0);
+            j.fixed_rows_mut::<3>(3 * a)
+                .copy_from(&(-(r * e.cross_matrix())));
+        }
+        let g = j.transpose() * slope;
+        // H = Jᵀ A J + sym(Gᵀ Q) − tr(Gᵀ Q) I,   G = mat(A q + b)
+        let m = mat3(&slope).transpose() * r;
+        let h = j.transpose() * self.a * j + (m + m.transpose()) * 0.5
+            - Matrix3::identity() * m.trace();
+        (g, (h + h.transpose()) * 0.5)
+    }
+
     /// Newton with the absolute values of the curvatures and a damping that grows when f does not fall.
     fn newton(&self, start: Matrix3<f64>) -> (Matrix3<f64>, f64) {
         let mut r = start;
         let mut f = self.at(&vec9(&r));
         let mut damping = 0.0;
         for _ in 0..MAX_STEPS {
-            let q = vec9(&r);
-            let slope = self.a * q + self.b;
-            // ∂vec(Q exp δ)/∂δ: column block a is −Q [e_a]ₓ
-            let mut j = SMatrix::<f64, 9, 3>::zeros();
-            for a in 0..3 {
-                let e = Vector3::ith(a, 1.0);
-                j.fixed_rows_mut::<3>(3 * a)
-                    .copy_from(&(-(r * e.cross_matrix())));
-            }
-            let g = j.transpose() * slope;
-            // H = Jᵀ A J + sym(Gᵀ Q) − tr(Gᵀ Q) I,   G = mat(A q + b)
-            let m = mat3(&slope).transpose() * r;
-            let h = j.transpose() * self.a * j + (m + m.transpose()) * 0.5
-                - Matrix3::identity() * m.trace();
-            let eigen = symmetric_eigen_small(&((h + h.transpose()) * 0.5));
+            let (g, h) = self.slopes(&r);
+            let eigen = symmetric_eigen_small(&h);
             let largest = eigen.values.amax().max(f64::MIN_POSITIVE);
             let mut delta = Vector3::zeros();
             for k in 0..3 {

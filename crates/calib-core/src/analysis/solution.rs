@@ -13,7 +13,7 @@ use crate::model::values::Values;
 use crate::solve::equations::{Objective, Workspace};
 use crate::solve::kept_rows::KeptRows;
 use crate::solve::minimize::SolveStatus;
-use crate::solve::normal::data_cost;
+use crate::solve::normal::{data_cost, prior_cost};
 use crate::solve::robust::Rejection;
 
 /// How well a parameter is identifiable.
@@ -168,6 +168,13 @@ impl Solution {
         let mut work = Workspace::new(&self.model);
         let chi2 = data_cost(objective, &self.values, &mut work);
         chi2.is_finite().then_some(chi2)
+    }
+
+    /// The same with the priors: solutions of the same observations are compared by it.
+    #[must_use]
+    pub fn cost_with(&self, sigma: &[f64]) -> Option<f64> {
+        let chi2 = self.chi2_with(sigma)?;
+        Some(prior_cost(&self.model, &self.values, chi2))
     }
 }
 

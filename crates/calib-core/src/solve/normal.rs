@@ -253,7 +253,13 @@ pub(crate) fn add_prior(model: &Model, values: &Values, out: &mut NormalEquation
 /// cannot be computed.
 pub(crate) fn cost(objective: Objective, values: &Values, work: &mut Workspace) -> f64 {
     let model = objective.model;
-    let mut sum = evaluate_cost(objective, values, work, !model.slots.is_empty());
+    let data = evaluate_cost(objective, values, work, !model.slots.is_empty());
+    let sum = prior_cost(model, values, data);
+    if sum.is_finite() { sum } else { f64::INFINITY }
+}
+
+/// What the priors of the free parameters cost, on top of a sum.
+pub(crate) fn prior_cost(model: &Model, values: &Values, mut sum: f64) -> f64 {
     for &p in &model.columns {
         let parameter = &model.problem.parameters[p];
         if let Some(sigma) = parameter.prior_sigma {
@@ -261,7 +267,7 @@ pub(crate) fn cost(objective: Objective, values: &Values, work: &mut Workspace) 
             sum += z * z;
         }
     }
-    if sum.is_finite() { sum } else { f64::INFINITY }
+    sum
 }
 
 /// eᵀV⁻¹e over all samples with V_s at these values; infinite where it cannot be computed.

@@ -54,6 +54,12 @@ super::topic! {
         "names-before": Error,
             "Bodies `{body}` and `{other}` have each other's names up to row {before}[[; {earlier:code} came before]]: with the names exchanged there, the recordings fit the nominal robot to {best} rms, without that to {none} rms, where nominal errors explain {limit}.[[ Nearly as likely: {rivals:code} moved.]]",
             "Correct the names in the tracker's software, or in the rows up to {before}[[, and in {earlier:code}]]. Give the bodies clearly different shapes before the next recording.";
+        "rows-earlier": Error,
+            "From row {row} on, the joint values that belong to a row stand {rows:row} earlier: with them paired so, the recordings fit the nominal robot to {best} rms, without that to {none} rms, where nominal errors explain {limit}.[[ Nearly as likely: {rivals:code} moved.]]",
+            "Joint values were lost between row {before} and row {row}, or the tracker wrote more rows. Pair the two tables by their times, or keep only the rows before {row}.";
+        "rows-later": Error,
+            "From row {row} on, the joint values that belong to a row stand {rows:row} later: with them paired so, the recordings fit the nominal robot to {best} rms, without that to {none} rms, where nominal errors explain {limit}.[[ Nearly as likely: {rivals:code} moved.]]",
+            "Rows of the tracker were lost between row {before} and row {row}, or the robot wrote more. Pair the two tables by their times, or keep only the rows before {row}.";
         "drift": Warning,
             "The tracker's frame drifted by {distance} ± {sigma}[[ and {angle}]] from the first row to the last.[[ Missing physics explains as much: `{physics}`.]]",
             "Let tracker and robot warm up before recording, and record the poses in random order.";

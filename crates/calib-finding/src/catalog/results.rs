@@ -49,6 +49,12 @@ super::topic! {
             "The closed forms assume that the swept axes meet in one point at a right angle, that the encoders have no zero offset, and that the rest of the robot matches the URDF; the reported uncertainty covers the tracker's noise only.",
             "Solve with `solve: {method: ml}`, which estimates axes, offsets and mounts together.";
     }
+    /// The robot may stand in another place before the tracker.
+    TWO_PLACES = "two-places" {
+        "": Error,
+            "The robot may stand in two places before the tracker, {distance} and {angle} apart: χ² differs by {by} only. The markers move too little to decide between them. The positions of these markers are predicted from either; those of other points may be wrong by as much as the places differ.",
+            "Move all joints over more of their range, or mount more markers, farther from the axes of the joints. Or state where the robot's root was measured to be: `tracker: {from_root: …}`.";
+    }
     /// An active bound.
     ON_ITS_LIMIT = "on-its-limit" {
         "": Warning,

@@ -24,6 +24,8 @@ pub(super) fn is_guess(about: &About) -> bool {
         }
         About::LinkStated { better, .. } | About::LinkOfProfile { better, .. } => better.is_some(),
         About::NotSeen { none_is, .. } => *none_is,
+        About::Unfollowed { body, .. } => body.is_some(),
+        About::Agrees { not, .. } => *not > 0,
         About::StatedSigma { stated, shown } => is_other_noise(*stated, *shown),
         About::StatedBodySigma { stated, shown } => {
             is_other_noise(stated.0, shown.0) || is_other_noise(stated.1, shown.1)

@@ -13,7 +13,7 @@
 
 use std::collections::BTreeMap;
 
-use calib_checks::structural::{PointRows, registration};
+use calib_checks::structural::{PointRows, registration, registrations};
 use calib_geometry::decompose::solve_least_squares;
 use calib_geometry::{mean, so3};
 use calib_profile::{BodyKind, Usage};
@@ -50,6 +50,14 @@ const ARM: f64 = 0.1;
 /// The linear start is kept up to this many times the least residual: the fit's own steps find the way from there.
 const MUCH: f64 = 2.0;
 
+/// Another place of the robot is asked for up to this many times the least residual, or up to what errors of the robot explain of small motions, m.
+const LIKE: f64 = 3.0;
+const EXPLAINED: f64 = 3e-3;
+/// It is turned by this much at the least, rad.
+const ANOTHER: f64 = 0.2;
+/// As many are asked for.
+const MOST_OTHERS: usize = 4;
+
 /// Start values from all fitted recordings.
 #[must_use]
 pub fn start(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Start {
@@ -58,6 +66,58 @@ pub fn start(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Start {
         .map(|measured| measured.pose)
         .or_else(|| from_known_mounts(inputs, tracks))
         .unwrap_or_else(|| from_points(inputs, tracks));
+    start_at(inputs, tracks, tracker_from_root)
+}
+
+/// Start values of another place of the robot that the recordings may mean as well, the best first: each leaves less than those around it, and little
+/// more than the best. Points that move by little more than errors of the robot explain leave several.
+#[must_use]
+pub fn others(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, start: &Start) -> Vec<Start> {
+    let profile = &inputs.robot.profile;
+    let is_stated =
+        profile.tracker.from_root.is_some() || profile.bodies.values().any(|b| b.mount.is_some());
+    if is_stated {
+        return Vec::new();
+    }
+    let all = registrations(&point_rows(inputs, tracks));
+    let Some(&(_, least)) = all.first() else {
+        return Vec::new();
+    };
+    let most = f64::max(LIKE * least, EXPLAINED);
+    let is_other = |place: &Isometry3<f64>| is_another(&start.tracker_from_root, place);
+    all.iter()
+        .filter(|(place, rms)| *rms < most && is_other(place))
+        .take(MOST_OTHERS)
+        .map(|(place, _)| start_at(inputs, tracks, *place))
+        .collect()
+}
+
+/// Start values of the place, of several, that a fit has taken.
+#[must_use]
+pub fn start_near(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+    near: &Isometry3<f64>,
+) -> Start {
+    let first = start(inputs, tracks);
+    match is_another(&first.tracker_from_root, near) {
+        true => start_at(inputs, tracks, *near),
+        false => first,
+    }
+}
+
+/// Whether a place is another minimum, and not the same one beside what errors of the robot do to it.
+#[must_use]
+pub fn is_another(first: &Isometry3<f64>, place: &Isometry3<f64>) -> bool {
+    (first.rotation.inverse() * place.rotation).angle() > ANOTHER
+}
+
+/// Start values where the robot stands there.
+fn start_at(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+    tracker_from_root: Isometry3<f64>,
+) -> Start {
     let mut start = Start {
         tracker_from_root,
         mounts: BTreeMap::new(),
@@ -167,8 +227,27 @@ fn from_known_mounts(
 }
 
 fn from_points(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Isometry3<f64> {
+    let (tracked, mut points) = tracked_points(inputs, tracks);
+    let linear = solve_points(&tracked).unwrap_or_else(Isometry3::identity);
+    points.extend(tracked.into_iter().map(|t| t.rows));
+    let best = registration(&points, &linear);
+    let best = best.filter(|found| found.rms_of_other > MUCH * found.rms);
+    best.map_or(linear, |found| found.tracker_from_root)
+}
+
+/// The rows of all points.
+fn point_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Vec<PointRows> {
+    let (tracked, mut points) = tracked_points(inputs, tracks);
+    points.extend(tracked.into_iter().map(|t| t.rows));
+    points
+}
+
+/// Markers and the positions of poses; and the ends of three arms of every pose, which count for its orientation.
+fn tracked_points(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+) -> (Vec<Tracked>, Vec<PointRows>) {
     let mut tracked = Vec::new();
-    // A pose counts as its position and the ends of three arms.
     let mut points: Vec<PointRows> = Vec::new();
     for (name, body) in &inputs.robot.profile.bodies {
         match &body.kind {
@@ -194,11 +273,7 @@ fn from_points(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Isometr
             }
         }
     }
-    let linear = solve_points(&tracked).unwrap_or_else(Isometry3::identity);
-    points.extend(tracked.into_iter().map(|t| t.rows));
-    let best = registration(&points, &linear);
-    let best = best.filter(|found| found.rms_of_other > MUCH * found.rms);
-    best.map_or(linear, |found| found.tracker_from_root)
+    (tracked, points)
 }
 
 /// Eq. (1) over all tracked points, which share R and t.

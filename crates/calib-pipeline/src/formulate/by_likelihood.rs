@@ -18,7 +18,8 @@ use crate::formulate::realign::realign;
 use crate::formulate::solved::Solved;
 use crate::formulate::stuck::{is_stuck, without_stuck};
 use crate::formulate::{
-    cameras, clock, computed, gain_or_scale, gear_ratio, noise, priors, row_levels, starts, wanted,
+    cameras, clock, computed, gain_or_scale, gear_ratio, noise, places, priors, row_levels, starts,
+    wanted,
 };
 use crate::prepare::inputs::Inputs;
 use crate::prepare::repeats::merge;
@@ -56,6 +57,8 @@ pub fn likelihood(
         // Where gross errors are looked for, what is kept may hang on the start: then it is that of a run of the profile.
         near: chosen.filter(|_| !settings.robust.enabled),
     };
+    let place = places::likeliest(inputs, checked, &settings, progress)?;
+    checked.findings.extend(place);
     let found = sided(inputs, checked, &how, progress)?;
     let (mut registered, mut fit, mut of_rows) =
         before_cameras(inputs, checked, &how, found, progress)?;

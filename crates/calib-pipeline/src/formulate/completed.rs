@@ -9,8 +9,9 @@ use std::collections::BTreeMap;
 use calib_core::{Change, ChangeSettings, Moved, Physics, ScoreTest, Settings};
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_profile::{Split, Usage};
+use nalgebra::Isometry3;
 
-use crate::estimate::start::start;
+use crate::estimate::start::start_near;
 use crate::formulate::bad_rows::{BadRows, bad_rows};
 use crate::formulate::formulation::{FreeSet, MlFit};
 use crate::formulate::parts::{RobotPart, What, with_parts};
@@ -72,7 +73,12 @@ pub(crate) fn beside(
         }
         false => tracks.clone(),
     };
-    let fit = fit_of(&mut inputs, &tracks, settings)?;
+    let fit = fit_of(
+        &mut inputs,
+        &tracks,
+        &fit.calibration.tracker_from_root,
+        settings,
+    )?;
     if !fit.solution.status.is_converged() {
         return None;
     }
@@ -182,9 +188,10 @@ fn shorter_side(inputs: &Inputs, fit: &MlFit, change: &Change) -> Vec<Excluded> 
 fn fit_of(
     inputs: &mut Inputs,
     tracks: &BTreeMap<String, BodyTrack>,
+    near: &Isometry3<f64>,
     settings: &Settings,
 ) -> Option<MlFit> {
-    let start = start(inputs, tracks);
+    let start = start_near(inputs, tracks, near);
     let fit = |inputs: &Inputs| {
         let stated = ml::state(inputs, tracks, &start, FreeSet::Profile);
         ml::fit(stated, inputs, settings).ok()

@@ -26,6 +26,7 @@ pub mod ml;
 pub mod model_checks;
 pub(crate) mod noise;
 pub mod parts;
+pub(crate) mod places;
 pub(crate) mod priors;
 pub mod realign;
 pub(crate) mod repeated;

@@ -31,12 +31,17 @@ pub(super) fn finding(layout: &Layout<'_>, outcome: &Outcome, found: &Jump) -> F
                 .with("body", Fact::name(body))
                 .with("other", Fact::name(other))
         }
+        Moved::Rows { by } => {
+            let kind = if by > 0 { "rows-earlier" } else { "rows-later" };
+            Finding::of_kind(id, kind, Subject::default())
+                .with("rows", Fact::count(usize::from(by.unsigned_abs())))
+        }
     };
     let name = |moved: &Moved| match *moved {
         Moved::Tracker => Some(layout.inputs.robot.profile.tracker.frame.clone()),
         Moved::Body(body) => Some(layout.bodies[body.0].to_owned()),
         Moved::Joint(joint) => Some(layout.joint(joint).to_owned()),
-        Moved::Names { .. } => None,
+        Moved::Names { .. } | Moved::Rows { .. } => None,
     };
     let later: Vec<String> = found.later.iter().map(recording).collect();
     let own = recording(&found.recording);
