@@ -281,6 +281,16 @@ pub fn is_no_place(name: &str) -> bool {
     words(name).iter().any(others)
 }
 
+/// Whether a column's name is that of a coordinate of a force, a moment, a velocity, an acceleration or a field by its letter: `F_x`, `a.z`, `omega_y`.
+#[must_use]
+pub fn is_quantity(name: &str) -> bool {
+    const LETTERS: [&str; 9] = ["f", "m", "t", "v", "w", "a", "g", "omega", "alpha"];
+    match words(name).as_slice() {
+        [of, axis] => LETTERS.contains(&of.as_str()) && matches!(axis.as_str(), "x" | "y" | "z"),
+        _ => false,
+    }
+}
+
 /// `(what stands before, the number, what stands behind)` for the last number of a name.
 #[must_use]
 pub fn numbered(name: &str) -> Option<(&str, u32, &str)> {

@@ -78,7 +78,23 @@ pub(crate) fn tracked(
     let pairs = [["r", "t"], ["p", "r"], ["p", "q"], ["q", "t"]];
     let single = pairs.iter().any(|pair| letters == *pair);
     other_notations(header, guess, used, (&free, single));
-    for (name, position) in named {
+    let has_bodies = !guess.map.bodies.is_empty();
+    let column = |position: &[usize; 3]| header.names[position[0]].as_str();
+    let quantity = |position: &[usize; 3]| {
+        let is_bare = header.unit(position[0]).unit.is_none();
+        is_bare && name::is_quantity(column(position))
+    };
+    // Beside `hand_1`, `F_x` is a force. Beside `B_x`, letters are the names of markers.
+    let is_letter = |position: &[usize; 3]| {
+        let words = name::words(column(position));
+        matches!(words.as_slice(), [of, _] if of.len() == 1)
+    };
+    let mut places = named.values().filter(|p| !quantity(p)).peekable();
+    let quantities = (has_bodies || places.peek().is_some()) && !places.any(is_letter);
+    for (name, position) in named.iter().map(|(name, p)| (name.clone(), *p)) {
+        if quantities && quantity(&position) {
+            continue;
+        }
         let is_used = position.iter().any(|i| used.contains(i));
         if is_used || name::is_no_position(&header.names[position[0]]) {
             continue;

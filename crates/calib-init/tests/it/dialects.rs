@@ -321,3 +321,35 @@ fn a_column_that_states_its_unit_is_not_corrected_by_another_name() {
     );
     assert!(corrected(&proposal).is_empty());
 }
+
+/// A force, a velocity and an acceleration beside the markers are no markers, unless the markers have letters for names.
+#[test]
+fn letters_of_forces_and_velocities_are_no_markers() {
+    let good = recordings(&HAND, Design::Random, 89);
+    let with = |name: &str, letters: &[&str]| {
+        let table = text(&good[name]);
+        let lines = table.lines().enumerate().map(|(row, line)| {
+            let cell = |letter: &str, axis: usize| match row {
+                0 => format!(",{letter}_{}", ["x", "y", "z"][axis]),
+                _ => format!(",{:.3}", (row as f64 * (1.3 + axis as f64)).sin() * 7.0),
+            };
+            let all = letters
+                .iter()
+                .flat_map(|letter| (0..3).map(move |axis| cell(letter, axis)));
+            format!("{line}{}\n", all.collect::<String>())
+        });
+        let lines: Vec<String> = lines.collect();
+        file(name, lines.concat())
+    };
+    let markers = |letters: &[&str]| -> usize {
+        let files: Vec<File> = good.keys().map(|name| with(name, letters)).collect();
+        let proposal = proposed(&files);
+        let of = |body: &calib_init::proposal::Body| body.markers.len();
+        proposal.bodies.iter().map(of).sum()
+    };
+    let none = markers(&[]);
+    assert!(none > 0);
+    assert_eq!(markers(&["F", "M", "v", "a"]), none);
+    assert_eq!(markers(&["omega"]), none);
+    assert!(markers(&["B", "F"]) > none);
+}
