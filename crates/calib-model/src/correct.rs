@@ -5,7 +5,7 @@
 //! |q_command − q_desired| ≤ bound for every joint                                                                      (2)
 //! ```
 //!
-//! λ begins at what rounding needs and grows until the step is inside its bound: near a singular posture the tool then comes as
+//! Where that ends beyond a limit of a joint, it begins again with (2) and the limits. λ begins at what rounding needs and grows until the step is inside its bound: near a singular posture the tool then comes as
 //! near as the bound allows. The result is evaluated by the forward model before it is given: a command that does not bring the
 //! tool nearer is refused, and the command is then the desired position itself.
 
@@ -84,7 +84,7 @@ pub enum Outcome {
     Nearer,
     /// Refused: within the bound nothing brings the tool nearer. The command is the desired position.
     NotReached,
-    /// Refused: this joint would have to leave its limits. The command is the desired position.
+    /// Refused: this joint would have to leave its limits, and inside them nothing brings the tool nearer. The command is the desired position.
     BeyondLimits(usize),
 }
 
@@ -176,11 +176,31 @@ impl Model {
         })
     }
 
+    /// Without a thought of limits; where that ends beyond one, inside them.
     fn approach_pose(
         &self,
         start: &[f64],
-        (tool, wanted): (Tool, &Pose),
+        target: (Tool, &Pose),
         options: &Options,
+        under: &Under,
+        (work, q): (&mut Work, &mut [f64]),
+    ) -> Result<Correction, ModelError> {
+        let free = self.approach(start, target, (options, false), under, (work, q))?;
+        if !matches!(free.outcome, Outcome::BeyondLimits(_)) {
+            return Ok(free);
+        }
+        let inside = self.approach(start, target, (options, true), under, (work, q))?;
+        Ok(match inside.outcome.is_usable() {
+            true => inside,
+            false => free,
+        })
+    }
+
+    fn approach(
+        &self,
+        start: &[f64],
+        (tool, wanted): (Tool, &Pose),
+        (options, inside): (&Options, bool),
         under: &Under,
         (work, q): (&mut Work, &mut [f64]),
     ) -> Result<Correction, ModelError> {
@@ -205,7 +225,7 @@ impl Model {
                     work.jacobian[*k] = offset.pull_back(&work.jacobian[*k]);
                 }
             }
-            let found = self.step(start, (link, &error), options, (work, q));
+            let found = self.step(start, (link, &error), (options, inside), (work, q));
             iterations += 1;
             if !found {
                 break;
@@ -283,7 +303,7 @@ impl Model {
         &self,
         start: &[f64],
         (link, error): (LinkId, &ToolError),
-        options: &Options,
+        (options, inside): (&Options, bool),
         (work, q): (&mut Work, &[f64]),
     ) -> bool {
         /// m (per rad): from what rounding needs to what holds any arm of meters.
@@ -311,8 +331,16 @@ impl Model {
             for (k, (tried, q)) in tried.iter_mut().zip(q).enumerate() {
                 *tried = q + if movers.contains(&k) { *tried } else { 0.0 };
             }
-            let inside = |k: usize| (tried[k] - start[k]).abs() <= bound(k);
-            movers.iter().all(|k| inside(*k))
+            let within = |k: usize, q: f64| {
+                let limits = self.moved[k].limits;
+                limits.is_none_or(|[low, high]| (low..=high).contains(&q))
+            };
+            // Where a joint is beyond its limits already, that is the caller's.
+            let allowed = |k: usize| {
+                let near = (tried[k] - start[k]).abs() <= bound(k);
+                near && (!inside || within(k, tried[k]) || !within(k, start[k]))
+            };
+            movers.iter().all(|k| allowed(*k))
         })
     }
 }

@@ -285,3 +285,45 @@ fn the_inverse_finds_what_the_forward_gave() {
     }
     assert!(reached >= 36, "{reached}");
 }
+
+/// A limit on the way to the target stops the joint, not the correction.
+#[test]
+fn a_limit_on_the_way_is_kept_and_the_tool_comes_nearer() {
+    let text = include_str!("arm.model.json");
+    let free = Model::from_json(text.as_bytes()).expect("a model");
+    let options = Options {
+        aim: Aim::Position,
+        ..Options::default()
+    };
+    let corrected = |model: &Model, q: &[f64]| {
+        let (mut work, mut command) = (model.work(), vec![0.0; q.len()]);
+        let tool = model.link("tool").expect("a link");
+        let done = model.correct(
+            q,
+            tool,
+            &options,
+            &Under::default(),
+            &mut work,
+            &mut command,
+        );
+        (done.expect("a correction"), command)
+    };
+    let (mut tried, mut nearer) = (0, 0);
+    for k in 0..40 {
+        let q = [0.3 + 0.01 * f64::from(k), 1.2 - 0.015 * f64::from(k)];
+        let (done, command) = corrected(&free, &q);
+        let joint = usize::from((command[1] - q[1]).abs() > (command[0] - q[0]).abs());
+        let half = (command[joint] - q[joint]).abs() / 2.0;
+        if !done.outcome.is_usable() || half < 1e-6 {
+            continue;
+        }
+        let mut file = RobotModelFile::from_json(text.as_bytes()).expect("a file");
+        file.joints[joint].limits = Some([q[joint] - half, q[joint] + half]);
+        let (kept, command) = corrected(&Model::new(&file).expect("a model"), &q);
+        tried += 1;
+        nearer += usize::from(kept.outcome == Outcome::Nearer && kept.after_m < kept.before_m);
+        assert!((command[joint] - q[joint]).abs() <= half + 1e-9, "{kept:?}");
+    }
+    assert!(tried >= 20, "{tried}");
+    assert!(10 * nearer >= 9 * tried, "{nearer} of {tried}");
+}
