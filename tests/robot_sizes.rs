@@ -1,6 +1,7 @@
 //! The same robot at 5 cm, 1.2 m and 30 m, with errors and noise of its size: what is said of it is said of all three. And trackers whose unit of
 //! length is another one in a recording, or that are far away.
 
+use crate::computed::{arm, points};
 use crate::scratch;
 
 use std::fmt::Write as _;
@@ -266,4 +267,49 @@ fn closed_forms_need_an_origin() {
         "{}",
         ran.stderr
     );
+}
+
+/// A tracker in a unit of length of its own makes every length of the robot longer, and held-out poses agree.
+#[test]
+fn a_tracker_with_another_scale_is_named_by_the_lengths_of_the_robot() {
+    let scaled = |scale: f64, seed: u64| {
+        let robot = RobotModel::from_urdf_text(&arm(5e-4, seed), "arm").expect("an arm");
+        let table = |n: usize, seed: u64| -> String {
+            let table = points(&robot, 2e-4, 4, n, seed);
+            let lines = table.lines().enumerate().map(|(row, line)| {
+                let cells = line.split(',').enumerate().map(|(column, cell)| {
+                    match (row, column, cell.parse::<f64>()) {
+                        (1.., 6.., Ok(at)) => format!("{:.4}", at * scale),
+                        _ => cell.to_owned(),
+                    }
+                });
+                cells.collect::<Vec<_>>().join(",") + "\n"
+            });
+            lines.collect()
+        };
+        let dir = Scratch::new()
+            .file("arm.urdf", arm(0.0, 0))
+            .file("poses.csv", table(60, seed + 1))
+            .file("checks.csv", table(15, seed + 2));
+        dir.calib([
+            "init",
+            "arm.urdf",
+            "poses.csv",
+            "checks.csv",
+            "-o",
+            "arm.yaml",
+        ]);
+        dir.calib(["run", "arm.yaml", "--out", "out"]);
+        let report = dir.json("out/report.json");
+        let all = report["findings"].as_array().cloned().unwrap_or_default();
+        let of = all.into_iter().find(|f| f["id"] == "lengths-in-one-ratio");
+        of.and_then(|f| f["facts"]["scale"]["value"].as_f64())
+    };
+    for (seed, scale) in [(1, 1.01), (2, 0.992), (3, 1.02), (4, 0.98)] {
+        let found = scaled(scale, seed).unwrap_or_else(|| panic!("{seed}: not named"));
+        assert!((found - (scale - 1.0)).abs() < 3e-3, "{seed}: {found}");
+    }
+    for seed in 5..13 {
+        assert_eq!(scaled(1.0, seed), None, "{seed}");
+    }
 }

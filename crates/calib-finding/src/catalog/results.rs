@@ -202,6 +202,12 @@ super::topic! {
             "The size of the robot is not observable: the priors alone determine it to ±{sigma:percent}, {at_reach} at the reach of {reach:m}.",
             "Record poses in which the joints move together over their ranges.";
     }
+    /// All lengths were found in one ratio to those of the URDF.
+    LENGTHS_IN_ONE_RATIO = "lengths-in-one-ratio" {
+        "": Warning,
+            "The {count} lengths of the robot that were found are {scale:percent} ± {sigma:percent} longer than in the URDF (negative: shorter), all in one ratio: the tracker's unit of length is off by as much, or the URDF's is.",
+            "Measure a known length with the tracker, such as a scale bar. If the tracker is right, the result is, too. If not, calibrate the tracker, or correct the scale of its export, and record again.";
+    }
     /// Contacts that leave a direction of the root open.
     CONTACT_DIRECTION_MISSING = "contact-direction-missing" {
         "": Warning,

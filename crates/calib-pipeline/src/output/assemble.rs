@@ -25,6 +25,7 @@ use crate::verify::accuracy::{accuracy_limits, workspace};
 use crate::verify::dh_table::dh_table;
 use crate::verify::information::data_information;
 use crate::verify::motions::motions;
+use crate::verify::proportions;
 use crate::verify::robot_changes::robot_changes;
 use crate::verify::tracker_noise::TrackerNoise;
 
@@ -45,7 +46,15 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         .flat_map(|g| &g.missing)
         .map(missing_physics)
         .collect();
-    let open = weak::findings(e.inputs, weak.as_ref(), e.held_out);
+    let (parameters, (robot_changes, accuracy_limits)) = rayon::join(
+        || e.fit.map_or_else(Vec::new, parameters),
+        || of_robot(e, information.as_ref()),
+    );
+    let mut open = weak::findings(e.inputs, weak.as_ref(), e.held_out);
+    // A scale of the tracker that the fit was asked for says the same.
+    if !e.findings.iter().any(|f| f.facts.get("scale").is_some()) {
+        open.extend(proportions::finding(&robot_changes));
+    }
     let findings = findings(e, &missing, open);
     let joint_sigma = e.fit.and_then(MlFit::joint_sigma).unwrap_or(0.0);
     let motions = motions(e.inputs, joint_sigma);
@@ -56,10 +65,6 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         || residuals(e),
     );
     let verdict = judgment.verdict;
-    let (parameters, (robot_changes, accuracy_limits)) = rayon::join(
-        || e.fit.map_or_else(Vec::new, parameters),
-        || of_robot(e, information.as_ref()),
-    );
     let scope = scope(e, &motions);
     let report = Report {
         profile: file.clone(),

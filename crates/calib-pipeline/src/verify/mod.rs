@@ -19,6 +19,7 @@ pub mod left_out;
 mod mimics;
 pub(crate) mod motions;
 pub mod moved;
+pub(crate) mod proportions;
 pub mod readings;
 pub mod residuals;
 pub mod robot_changes;
