@@ -193,7 +193,7 @@ fn beyond_hypotheses(
     match &outcome.decision.clone() {
         Decision::Undecided { .. } => {
             let most = clearly_below(outcome.rms, outcome, options);
-            outcome.jump = jump(data, outcome, most, options);
+            outcome.jump = changed(data, outcome, most, options);
             if outcome.jump.is_none() {
                 outcome.readings = wrong_readings(data, outcome, options);
             }
@@ -209,7 +209,7 @@ fn beyond_hypotheses(
                 let corrected = is_of_rows(named).then(|| apply_all(&named.correction, data))?;
                 behind_outliers((data, &corrected), screened, outcome, options)
             };
-            if let Some(found) = lost().or_else(|| jump(data, outcome, most, options)) {
+            if let Some(found) = lost().or_else(|| changed(data, outcome, most, options)) {
                 outcome.jump = Some(found);
                 outcome.decision = undecided(None, ratio);
             } else if let Some(found) = better_than(named, data, outcome, options) {
@@ -234,7 +234,7 @@ fn beyond_hypotheses(
                 let most = clearly_below(left, outcome, options);
                 let limit = outcome.expected.map_or(0.0, |e| e.limit);
                 if outcome.rms > WITHIN_A_FIT * limit
-                    && let Some(found) = jump(data, outcome, most, options)
+                    && let Some(found) = changed(data, outcome, most, options)
                 {
                     outcome.decision = undecided(None, *ratio);
                     outcome.continuous = None;
@@ -243,6 +243,15 @@ fn beyond_hypotheses(
             }
         }
         _ => {}
+    }
+}
+
+/// A change at one row, or rows that were lost there.
+fn changed(data: &Data, outcome: &Outcome, most: f64, options: &Options) -> Option<Jump> {
+    let moved = jump(data, outcome, most, options);
+    match lost_rows(data, outcome, most) {
+        Some(lost) if moved.as_ref().is_none_or(|m| lost.rms < m.rms) => Some(lost),
+        _ => moved,
     }
 }
 

@@ -22,7 +22,6 @@ use super::correct::same_shape;
 use super::data::Data;
 use super::hypothesis::{Hypothesis, Scope, Scoped};
 use super::ids::{BodyIndex, JointIndex, RecordingIndex};
-use super::lost::lost_rows;
 use super::moments::{Moments, Normal};
 use super::scan::{Fit, Scan};
 use super::special::{estimated, rigid_motion};
@@ -131,11 +130,7 @@ pub(super) fn jump(all: &Data, outcome: &Outcome, most: f64, options: &Options) 
         }
     }
     let explains = |jump: &Jump| jump.rms <= limit.min(most);
-    let best = best.filter(explains);
-    match lost_rows(all, outcome, most) {
-        Some(lost) if best.as_ref().is_none_or(|b| lost.rms < b.rms) => Some(lost),
-        _ => best,
-    }
+    best.filter(explains)
 }
 
 /// Empty columns are 0 in their own recording; in a group with others they would be missing.
