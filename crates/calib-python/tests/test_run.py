@@ -100,9 +100,11 @@ def test_errors_say_what_the_program_says(program: Program, tmp_path: Path) -> N
         calib.run(tmp_path / "none.yaml")
 
 
-def busy_threads() -> int:
-    """Threads of this process."""
-    return len(os.listdir("/proc/self/task"))
+def is_idle() -> bool:
+    """Whether this process calculates nothing for 20 ms. Threads are not counted: packages of other tests start some that stay."""
+    before = time.process_time()
+    time.sleep(0.02)
+    return time.process_time() - before < 0.005
 
 
 @pytest.fixture(scope="module")
@@ -125,7 +127,6 @@ def heard_interrupts() -> Iterator[None]:
     signal.signal(signal.SIGINT, before)
 
 
-@pytest.mark.skipif(not os.path.isdir("/proc/self/task"), reason="threads are counted on Linux")
 @pytest.mark.usefixtures("heard_interrupts")
 @pytest.mark.parametrize("part", [0.05, 0.2, 0.35, 0.5, 0.6])
 def test_an_interrupt_is_answered_within_100_ms(
@@ -134,7 +135,6 @@ def test_an_interrupt_is_answered_within_100_ms(
     after = part * selection_s
     calib.run("robots/ripley.yaml", method="paper")  # The pool of threads is there from now on.
     time.sleep(0.2)  # The thread of that run is gone.
-    before = busy_threads()
     sent: list[float] = []
 
     def interrupt() -> None:
@@ -147,8 +147,8 @@ def test_an_interrupt_is_answered_within_100_ms(
         calib.run("robots/ripley.yaml", select=True, out=tmp_path / "out")
     answered = time.monotonic() - sent[0]
     timer.join()
-    while busy_threads() > before and time.monotonic() - sent[0] < 10:
-        time.sleep(0.002)
+    while not is_idle() and time.monotonic() - sent[0] < 10:
+        pass
     ended = time.monotonic() - sent[0]
     with capsys.disabled():
         print(f"\ninterrupted after {after:.2f} s: answered in {answered * 1e3:.0f} ms, computation ended in {ended * 1e3:.0f} ms")

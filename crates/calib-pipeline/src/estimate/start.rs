@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use calib_checks::structural::{PointRows, registration, registrations};
 use calib_geometry::decompose::solve_least_squares;
 use calib_geometry::{mean, so3};
-use calib_profile::{BodyKind, Usage};
+use calib_profile::{Body, BodyKind, Usage};
 use nalgebra::{
     DMatrix, DVector, Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3,
 };
@@ -76,7 +76,13 @@ pub fn others(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>, start: &Sta
     let profile = &inputs.robot.profile;
     let is_stated =
         profile.tracker.from_root.is_some() || profile.bodies.values().any(|b| b.mount.is_some());
-    if is_stated {
+    // A body whose orientation is seen turns as the robot turns it in one place only.
+    let turns = |(name, body): (&String, &Body)| {
+        let has_frame = body.kind == BodyKind::Pose || tracks[name].template.is_some();
+        let mut joints = inputs.robot.model.chain_to_root(body.link).into_iter();
+        has_frame && joints.any(|joint| inputs.robot.model.joint(joint).kind.turns())
+    };
+    if is_stated || profile.bodies.iter().any(turns) {
         return Vec::new();
     }
     let all = registrations(&point_rows(inputs, tracks));
