@@ -19,7 +19,7 @@ use crate::prepare::inputs::Inputs;
 /// Twice a logarithm of likelihoods by which one place must be likelier: 1 100 times.
 const LIKELIER: f64 = 14.0;
 /// Costs closer than this are one minimum, found twice along a direction that nothing determines.
-const SAME: f64 = 0.1;
+const SAME: f64 = 0.01;
 
 /// Takes the start values of the likeliest place; what is said where another is about as likely.
 ///
