@@ -97,7 +97,26 @@ fn model_diff(a: &Path, b: &Path) -> Result<calib_urdf::ModelDiff, ApplyError> {
     from.retain(|(name, _)| !computed(name));
     let to: Vec<_> = to.into_iter().filter(|(name, _)| !computed(name)).collect();
     let mut diff = calib_urdf::diff_origins(&from, &to);
-    diff.not_compared = not_compared;
+    // What one file lacks may be what xacro makes of a name of it.
+    let composed: Vec<&String> = from
+        .iter()
+        .chain(&to)
+        .map(|(name, _)| name)
+        .chain(&not_compared)
+        .filter(|name| name.contains("${") || name.contains("$("))
+        .collect();
+    let unknown = |name: &String| {
+        let mut composed = composed.iter();
+        composed.any(|written| *written == name || calib_urdf::xacro_may_name(written, name))
+    };
+    for list in [&mut diff.added_joints, &mut diff.removed_joints] {
+        let (open, only): (Vec<_>, Vec<_>) = std::mem::take(list).into_iter().partition(unknown);
+        *list = only;
+        diff.not_compared.extend(open);
+    }
+    diff.not_compared.extend(not_compared);
+    diff.not_compared.sort();
+    diff.not_compared.dedup();
     Ok(diff)
 }
 

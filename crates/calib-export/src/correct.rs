@@ -3,13 +3,15 @@
 use std::path::Path;
 
 use calib_finding::cell;
-use calib_model::{Aim, Approach, Correction, ModelError, Options, Outcome, Pose, Under};
+use calib_model::file::ModelBody;
+use calib_model::{Aim, ModelError, Options, Outcome, Place, Pose};
 use calib_recording::joint_column;
+use nalgebra::{Isometry3, Point3};
 
+use crate::commands::{Command, Commands};
 use crate::error::ExportError;
 use crate::read::Robot;
-use crate::starts::{LEVER, Starts};
-use crate::table::{Csv, NOTES, program};
+use crate::table::{Csv, NOTES, Program, program};
 
 /// Rows at which it is asked how well the model knows where the tool stands.
 const KNOWN_AT: usize = 200;
@@ -36,7 +38,7 @@ pub struct Corrected {
     pub rows: usize,
     /// Rows whose tool stands where it is wanted.
     pub reached: usize,
-    /// Of them, outside of the fitted range.
+    /// Rows whose command brings the tool there, or nearer, outside of the fitted range.
     pub outside: usize,
     /// Of rows without joint positions, those that are reached by another posture than that of the row before.
     pub elsewhere: usize,
@@ -59,10 +61,13 @@ pub struct Corrected {
     pub assumed_temperature_c: Option<f64>,
     /// The rows have poses of the tool: these are reached by the command.
     pub cartesian: bool,
+    /// Poses and positions of the table that belong to nothing the robot or its calibration knows, by name: they are not used.
+    pub unused: Vec<String>,
 }
 
-/// Corrects a table of joint positions. Where the table has poses of the tool (`<tool>.x_m` …, in the root's frame), the commands
-/// reach those, from the row's joints or, where it has none, from the row before, else from postures all over the fitted range.
+/// Corrects a table of joint positions. Where the table has poses of the tool (`<tool>.x_m` …, in the root's frame), or its positions and
+/// only these are wanted, the commands reach those, from the row's joints or, where it has none, from the row before, else from
+/// postures all over the fitted range.
 ///
 /// # Errors
 /// [`ExportError`].
@@ -73,83 +78,45 @@ pub fn correct(
 ) -> Result<Corrected, ExportError> {
     let model = &robot.model;
     let program = program(table, model)?;
-    let tool = robot.tool(options.tool.as_deref())?;
     let last = &model.links()[model.last_link().index()];
-    let wanted = program.poses.get(options.tool.as_ref().unwrap_or(last));
+    let name = options.tool.as_ref().unwrap_or(last);
+    let tool = robot.tool(options.tool.as_deref())?;
+    let Wanted {
+        poses: wanted,
+        oriented,
+        unused,
+    } = wanted(&program, robot, name, options.position_only)?;
     let without_joints = program.absent.len() == model.joints().len();
-    let (mut work, mut approach) = (model.work(), Approach::new(model));
     let mut out = Corrected::of(&program.absent, wanted.is_some());
-    out.tool.clone_from(options.tool.as_ref().unwrap_or(last));
+    out.tool.clone_from(name);
+    out.unused = unused;
     let every = program.q.len().div_ceil(KNOWN_AT);
-    let (mut variances, mut starts) = (Vec::new(), None);
+    let mut variances = Vec::new();
     out.assumed_temperature_c = program.assumed_temperature_c(model);
     let mut csv = Csv::default();
     header(&mut csv, robot);
-    let mut command = vec![0.0; model.joints().len()];
+    let mut commands = Commands::new(model, tool, options, without_joints);
     for (k, q) in program.q.iter().enumerate() {
         let wrong = |source: ModelError| ExportError::Row {
             file: program.file.clone(),
             line: program.lines[k],
             source: Box::new(source),
         };
-        let target: Option<Option<&Pose>> = wanted.map(|poses| poses[k].as_ref());
+        let target: Option<Option<Pose>> = wanted.as_ref().map(|poses| poses[k]);
         csv.cell(&program.lines[k].to_string());
         let (Some(q), false) = (q, target == Some(None)) else {
             lost(&mut csv, robot);
             continue;
         };
-        let seed = if without_joints {
-            command.clone()
-        } else {
-            q.clone()
-        };
-        approach.update(model, &seed).map_err(wrong)?;
-        let under = Under {
-            approach: approach.directions(),
-            held: None,
-            temperature_c: program.temperature_c(k),
-        };
-        let done = match target.flatten() {
-            None => {
-                let with = options.within(Options::default());
-                model.correct(&seed, tool, &with, &under, &mut work, &mut command)
-            }
-            Some(pose) => {
-                let with = options.within(Options::inverse());
-                let out = (&mut work, &mut command[..]);
-                model.ik(pose, &seed, tool, &with, &under, out)
-            }
-        };
-        let mut done = done.map_err(wrong)?;
-        // Who states how far a joint may go wants no other posture.
-        let free = without_joints && options.largest_rad.is_none() && options.largest_m.is_none();
-        if let Some(pose) = target.flatten().filter(|_| free && !is_there(&done)) {
-            let known = match starts.take() {
-                Some(known) => known,
-                None => Starts::of(model, tool, &mut work).map_err(wrong)?,
-            };
-            let near = known.near(pose, options.within(Options::inverse()).aim);
-            let from = |start: &[f64], other: &mut [f64]| {
-                let with = options.within(Options::inverse());
-                model.ik(pose, start, tool, &with, &under, (&mut work, other))
-            };
-            let is_other = nearest(&near, from, (&mut done, &mut command));
-            out.elsewhere += usize::from(is_other.map_err(wrong)?);
-            starts = Some(known);
-            // From none of them the tool came there: where it ended says nothing of the pose.
-            if matches!(done.outcome, Outcome::Nearer) && is_elsewhere(&done) {
-                command.copy_from_slice(&seed);
-                (done.after_m, done.after_rad) = (done.before_m, done.before_rad);
-                done.outcome = Outcome::NotReached;
-            }
-        }
+        let done = commands.next(q, target.flatten(), program.temperature_c(k));
+        let done = done.map_err(wrong)?;
         out.count(&done);
         if k % every == 0 && model.has_uncertainty() {
-            let sigma = model.sigma(&command, tool, &under, &mut work);
+            let sigma = commands.sigma(&done.q, program.temperature_c(k));
             let position = sigma.map_err(wrong)?.fixed_view::<3, 3>(3, 3).trace();
             variances.push(position);
         }
-        line(&mut csv, robot, &command, &done);
+        line(&mut csv, robot, &done, oriented);
     }
     let mean = variances.iter().sum::<f64>() / variances.len().max(1) as f64;
     out.known_m = (!variances.is_empty()).then(|| mean.sqrt());
@@ -158,51 +125,88 @@ pub fn correct(
     Ok(out)
 }
 
-fn is_there(done: &Correction) -> bool {
-    matches!(done.outcome, Outcome::Reached | Outcome::OutOfScope(_))
+/// What the table wants of the tool beside joint positions.
+struct Wanted {
+    /// By row; `None`: what the nominal model says of the joint positions.
+    poses: Option<Vec<Option<Pose>>>,
+    /// Whether the orientation of these is known.
+    oriented: bool,
+    /// What else the table has the place of, that neither the robot nor its calibration knows.
+    unused: Vec<String>,
 }
 
-/// Replaces the command by the one that ends nearest to the pose, from these starts; whether it did and the tool is there, or nearly.
-fn nearest<F>(
-    starts: &[&[f64]],
-    mut from: F,
-    (done, command): (&mut Correction, &mut Vec<f64>),
-) -> Result<bool, ModelError>
-where
-    F: FnMut(&[f64], &mut [f64]) -> Result<Correction, ModelError>,
-{
-    let mut other = command.clone();
-    let mut replaced = false;
-    for start in starts {
-        let tried = from(start, &mut other)?;
-        // A pose that the real robot just misses, its arm stretched, is reached from nowhere: the nearest counts.
-        let nearer = tried.outcome == Outcome::Nearer && away(&tried) < away(done);
-        if is_there(&tried) || nearer {
-            command.copy_from_slice(&other);
-            replaced = true;
-            *done = tried;
-        }
-        if is_there(done) {
-            break;
-        }
+fn wanted(
+    program: &Program,
+    robot: &Robot,
+    tool: &str,
+    position_only: bool,
+) -> Result<Wanted, ExportError> {
+    let model = &robot.model;
+    let column = |found: &str, what: String, remedy: String| ExportError::Column {
+        file: program.file.clone(),
+        found: format!("`{found}`"),
+        what,
+        remedy,
+    };
+    let names = || program.poses.keys().chain(program.points.keys());
+    let without_joints = program.absent.len() == model.joints().len();
+    if let Some(poses) = program.poses.get(tool) {
+        return Ok(Wanted {
+            poses: Some(poses.clone()),
+            oriented: true,
+            unused: names()
+                .filter(|n| *n != tool && model.place(n).is_none())
+                .cloned()
+                .collect(),
+        });
     }
-    Ok(replaced && !is_elsewhere(done))
-}
-
-/// How far the tool is from its pose, m: a rotation by 1 rad counts as by [`LEVER`].
-fn away(done: &Correction) -> f64 {
-    done.after_m + LEVER * done.after_rad
-}
-
-/// A tool that is further from a pose than this is nowhere near it, m and rad (1°).
-const NEAR: (f64, f64) = (5e-3, 0.0175);
-
-fn is_elsewhere(done: &Correction) -> bool {
-    done.after_m > NEAR.0 || done.after_rad > NEAR.1
+    if let Some(points) = program.points.get(tool) {
+        if !position_only {
+            let what =
+                "is the tool, and the table has its position without its orientation".to_owned();
+            let remedy = format!(
+                "add `{tool}.qx`, `.qy`, `.qz` and `.qw`, or correct the position alone with `--position-only`"
+            );
+            return Err(column(tool, what, remedy));
+        }
+        let at = |t: &Point3<f64>| Pose::of(&Isometry3::translation(t.x, t.y, t.z));
+        return Ok(Wanted {
+            poses: Some(points.iter().map(|p| p.as_ref().map(at)).collect()),
+            oriented: false,
+            unused: Vec::new(),
+        });
+    }
+    // The place of a link, or of anything where the table has nothing else, is meant as a target; a recording has those of its bodies.
+    let of_robot = |name: &str| matches!(model.place(name), Some(Place::Link(_) | Place::Point(_)));
+    if let Some(other) =
+        names().find(|n| without_joints || (of_robot(n) && program.poses.contains_key(*n)))
+    {
+        let known = of_robot(other);
+        let what = format!("is not the tool, which is `{tool}`");
+        let remedy = match known {
+            true => format!("state `--tool {other}`, or leave its columns out"),
+            false => format!(
+                "name the columns after the tool, `{tool}.x_m` …, or state another with `--tool`"
+            ),
+        };
+        return Err(column(other, what, remedy));
+    }
+    let known = |name: &str| {
+        let of_marker = |body: &ModelBody| {
+            let mut markers = body.markers_m.keys();
+            markers.any(|marker| name == marker || name.ends_with(&format!(".{marker}")))
+        };
+        robot.model.place(name).is_some() || robot.file.bodies.values().any(of_marker)
+    };
+    Ok(Wanted {
+        poses: None,
+        oriented: true,
+        unused: names().filter(|n| !known(n)).cloned().collect(),
+    })
 }
 
 impl CorrectOptions {
-    fn within(&self, default: Options) -> Options {
+    pub(crate) fn within(&self, default: Options) -> Options {
         Options {
             aim: match self.position_only {
                 true => Aim::Position,
@@ -232,23 +236,22 @@ impl Corrected {
             absent: absent.to_vec(),
             assumed_temperature_c: None,
             cartesian,
+            unused: Vec::new(),
         }
     }
 
-    fn count(&mut self, done: &Correction) {
+    fn count(&mut self, done: &Command) {
         self.rows += 1;
+        self.elsewhere += usize::from(done.elsewhere);
         match done.outcome {
-            Outcome::Reached => self.reached += 1,
-            Outcome::OutOfScope(_) => {
-                self.reached += 1;
-                self.outside += 1;
-            }
+            Outcome::Reached | Outcome::OutOfScope(_) => self.reached += 1,
             Outcome::Nearer => self.nearer += 1,
             _ => self.refused += 1,
         }
+        self.outside += usize::from(done.outcome.is_usable() && done.outside.is_some());
         let sums = [
-            (&mut self.before_m, done.before_m),
-            (&mut self.after_m, done.after_m),
+            (&mut self.before_m, done.before.0),
+            (&mut self.after_m, done.after.0),
         ];
         for (sum, error) in sums {
             sum[0] += error * error;
@@ -279,20 +282,25 @@ fn header(csv: &mut Csv, robot: &Robot) {
     csv.end();
 }
 
-fn line(csv: &mut Csv, robot: &Robot, command: &[f64], done: &Correction) {
-    for (q, (_, prismatic)) in command.iter().zip(columns(robot)) {
+fn line(csv: &mut Csv, robot: &Robot, done: &Command, oriented: bool) {
+    for (q, (_, prismatic)) in done.q.iter().zip(columns(robot)) {
         csv.number(Some(if prismatic { *q } else { q.to_degrees() }), 9);
     }
     let joint = |i: usize| &robot.model.joints()[i].name;
-    csv.cell(&match done.outcome {
-        Outcome::Reached => "reached".to_owned(),
-        Outcome::OutOfScope(i) => format!("outside:{}", joint(i)),
-        Outcome::Nearer => "nearer".to_owned(),
-        Outcome::BeyondLimits(i) => format!("refused:limits:{}", joint(i)),
+    csv.cell(&match (done.outcome, done.outside) {
+        (Outcome::Reached | Outcome::OutOfScope(_), None) => "reached".to_owned(),
+        (Outcome::Reached | Outcome::OutOfScope(_), Some(i)) => format!("outside:{}", joint(i)),
+        (Outcome::Nearer, None) => "nearer".to_owned(),
+        (Outcome::Nearer, Some(i)) => format!("nearer:outside:{}", joint(i)),
+        (Outcome::BeyondLimits(i), _) => format!("refused:limits:{}", joint(i)),
         _ => "refused".to_owned(),
     });
-    let errors = [done.before_m, done.after_m, done.before_rad, done.after_rad];
-    errors.iter().for_each(|x| csv.number(Some(1e3 * x), 6));
+    for at in [done.before.0, done.after.0] {
+        csv.number(Some(1e3 * at), 6);
+    }
+    for turned in [done.before.1, done.after.1] {
+        csv.number(oriented.then_some(1e3 * turned), 6);
+    }
     csv.end();
 }
 

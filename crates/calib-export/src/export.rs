@@ -169,10 +169,8 @@ impl Asked<'_> {
 
     /// Origins of a UR arm.
     fn ur(&self) -> Result<Exported, ExportError> {
-        let arm = ur::arm(&self.geometry, &self.chain).map_err(|reason| {
-            let remedy = "name the last link of the arm with `--tool`, or use `urdf`";
-            unfit(self.target, reason, remedy)
-        })?;
+        let arm = ur::arm(&self.geometry, &self.chain)
+            .map_err(|(reason, remedy)| unfit(self.target, reason, remedy))?;
         let model = evaluated(&arm.file).map_err(|e| self.of_model(&e))?;
         let held = truth(&model, self.link, &self.held_out);
         let others = arm.others.then_some("origins of other joints");
@@ -297,11 +295,20 @@ impl Asked<'_> {
             _ => &[],
         };
         notes.extend(of_target.iter().map(|note| (*note).to_owned()));
+        let holds_masses = matches!(
+            self.target,
+            Target::UrdfBest | Target::Urdf | Target::Mjcf | Target::Sdf
+        );
+        if holds_masses && self.robot.file.masses_assumed {
+            notes.push(NO_MASSES.to_owned());
+        }
         notes
     }
 }
 
 const NO_SHAPES: &str = "Efforts, velocities, inertia tensors and shapes are not known here and are 0 or absent: `calib apply` writes the geometry into a URDF that has them.";
+
+const NO_MASSES: &str = "The nominal URDF states no masses, and none are written: those that the fit assumed are not the robot's.";
 
 /// A joint's reading at a posture of a model; 0 where it has no such joint.
 fn by_name(model: &Model, q: &[f64], name: &str) -> f64 {

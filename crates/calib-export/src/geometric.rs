@@ -32,7 +32,8 @@ pub(crate) fn axis_of(joint: &calib_model::file::ModelJoint) -> Option<Axis> {
     }
 }
 
-/// What a format without effects can hold: parent_from_joint · exp(S · offset).
+/// What a format without effects can hold: parent_from_joint · exp(S · offset). Masses that were assumed are not the robot's: only
+/// their product with the compliances means something, and these are not there.
 pub(crate) fn geometric(file: &RobotModelFile) -> RobotModelFile {
     let mut out = file.clone();
     for joint in &mut out.joints {
@@ -43,6 +44,11 @@ pub(crate) fn geometric(file: &RobotModelFile) -> RobotModelFile {
             joint.parent_from_joint = pose(&(isometry(&joint.parent_from_joint) * moved));
         }
         joint.effects.clear();
+    }
+    if out.masses_assumed {
+        for link in &mut out.links {
+            (link.mass_kg, link.first_moment_kg_m) = (0.0, [0.0; 3]);
+        }
     }
     out.uncertainty = None;
     out

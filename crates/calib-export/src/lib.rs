@@ -15,6 +15,7 @@
 //! that were not fitted.
 
 mod best;
+mod commands;
 mod correct;
 mod cost;
 mod dh;

@@ -8,6 +8,8 @@ use calib_recording::{
     ColumnMap, Filled, JointUnit, Poses, Problem, ReadOptions, WHOLE_ROBOT, read_path,
 };
 
+use nalgebra::Point3;
+
 use crate::error::ExportError;
 use crate::read::Robot;
 
@@ -39,6 +41,8 @@ pub(crate) struct Program {
     pub temperature_c: Vec<Vec<f64>>,
     /// Poses that the table has, by name and row.
     pub poses: BTreeMap<String, Vec<Option<Pose>>>,
+    /// Positions without an orientation that the table has, by name and row, m.
+    pub points: BTreeMap<String, Vec<Option<Point3<f64>>>>,
     /// Joints of the robot that the table has no column for: they count as 0.
     pub absent: Vec<String>,
 }
@@ -121,6 +125,7 @@ pub(crate) fn program(path: &Path, model: &Model) -> Result<Program, ExportError
                 (name.clone(), rows.collect())
             })
             .collect(),
+        points: poses.markers,
         lines: poses.rows,
         file,
     })
@@ -207,9 +212,15 @@ fn fits(file: &str, poses: &Poses, model: &Model) -> Result<(), ExportError> {
             .place(name)
             .is_some_and(|p| !matches!(p, Place::Body(_)))
     };
-    let poses_given = poses.bodies.keys().any(|b| tool(b));
-    if !some && !poses_given {
-        let what = "has no column of a joint".to_owned();
+    let mut names = poses.bodies.keys().chain(poses.markers.keys());
+    if !some && !names.any(|name| tool(name)) {
+        let mut names = poses.bodies.keys().chain(poses.markers.keys());
+        let what = match names.next() {
+            None => "has no column of a joint".to_owned(),
+            Some(name) => {
+                format!("has no column of a joint, and `{name}` is no link or point of this robot")
+            }
+        };
         let first = model.joints().first().map_or("joint", |j| j.name.as_str());
         let remedy = format!(
             "name the columns after the joints, as `{first}_deg`: {}",

@@ -3,6 +3,8 @@
 //! `ur_description` puts the joints directly on each other and turns each about z; it has no entry for other joints. What stands
 //! between its root and its tool besides the six is what the nominal URDF has.
 
+use std::collections::BTreeSet;
+
 use calib_model::file::{ModelJoint, ModelMotion, ModelPose, RobotModelFile};
 use calib_urdf::ur_key;
 
@@ -30,8 +32,12 @@ pub(crate) fn key(joint: &ModelJoint) -> &'static str {
 /// The six joints of a chain.
 ///
 /// # Errors
-/// Why the chain has not these joints.
-pub(crate) fn arm(geometry: &RobotModelFile, chain: &[usize]) -> Result<Arm, String> {
+/// Why the chain has not these joints, and what to do.
+pub(crate) fn arm(
+    geometry: &RobotModelFile,
+    chain: &[usize],
+) -> Result<Arm, (String, &'static str)> {
+    const OTHER: &str = "use `urdf`, or `dh`, `hayati` or `poe` for the chain to a tool";
     let joint = |i: &usize| &geometry.joints[*i];
     let named = |i: &&usize| ur_key(&joint(i).name).is_some();
     let joints: Vec<usize> = chain.iter().filter(named).copied().collect();
@@ -39,22 +45,35 @@ pub(crate) fn arm(geometry: &RobotModelFile, chain: &[usize]) -> Result<Arm, Str
     keys.sort_unstable();
     keys.dedup();
     if joints.len() != 6 || keys.len() != 6 {
-        return Err(format!(
+        let all: BTreeSet<&str> = geometry
+            .joints
+            .iter()
+            .filter_map(|j| ur_key(&j.name))
+            .collect();
+        // Another tool has more of them before it only where the robot has them.
+        let remedy = match all.len() {
+            6 => "name the last link of the arm with `--tool`, or use `urdf`",
+            _ => OTHER,
+        };
+        let reason = format!(
             "its chain has {} of the six joints of a UR arm (shoulder_pan_joint, shoulder_lift_joint, elbow_joint, wrist_1_joint, wrist_2_joint, \
              wrist_3_joint)",
             keys.len()
-        ));
+        );
+        return Err((reason, remedy));
     }
     for pair in joints.windows(2) {
         let (a, b) = (joint(&pair[0]), joint(&pair[1]));
         if a.child != b.parent {
-            return Err(format!("{} does not carry {} directly", a.name, b.name));
+            let reason = format!("{} does not carry {} directly", a.name, b.name);
+            return Err((reason, OTHER));
         }
     }
     for joint in joints.iter().map(joint) {
         let about_z = |a: [f64; 3]| a[2] > 0.0 && a[0].hypot(a[1]) <= SAME * a[2];
         if joint.motion != ModelMotion::Revolute || !joint.axis.is_some_and(about_z) {
-            return Err(format!("{} does not turn about its z axis", joint.name));
+            let reason = format!("{} does not turn about its z axis", joint.name);
+            return Err((reason, OTHER));
         }
     }
     let mut file = geometry.clone();

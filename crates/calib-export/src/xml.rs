@@ -191,15 +191,19 @@ fn mjcf_body(
     let _ = writeln!(out, "{pad}</body>");
 }
 
-/// SDF 1.9: joints in their parents, links in their joints.
+/// SDF: joints in their parents, links in their joints. Version 1.9, and 1.11 where a joint mimics another: the first that knows how.
 pub(crate) fn sdf(file: &RobotModelFile, notes: &[String]) -> String {
     let mut out = format!("<?xml version=\"1.0\"?>\n{}", comment(notes));
+    let mimics = file.joints.iter().any(|j| j.mimic.is_some());
+    let version = if mimics { "1.11" } else { "1.9" };
     let _ = writeln!(
         out,
-        "<sdf version=\"1.9\">\n  <model name=\"{}\">\n    <link name=\"{}\"/>",
+        "<sdf version=\"{version}\">\n  <model name=\"{}\">\n    <link name=\"{}\">",
         escaped(&file.robot),
         escaped(&file.root)
     );
+    sdf_inertial(file, &file.root, &mut out);
+    out.push_str("    </link>\n");
     for joint in &file.joints {
         let kind = match (joint.motion, joint.limits) {
             (ModelMotion::Fixed, _) => "fixed",
@@ -228,21 +232,36 @@ pub(crate) fn sdf(file: &RobotModelFile, notes: &[String]) -> String {
                     "        <limit>\n          <lower>{low}</lower>\n          <upper>{high}</upper>\n        </limit>"
                 );
             }
+            if let Some(m) = &joint.mimic {
+                let _ = writeln!(
+                    out,
+                    "        <mimic joint=\"{}\">\n          <multiplier>{}</multiplier>\n          <offset>{}</offset>\n          \
+                     <reference>0</reference>\n        </mimic>",
+                    escaped(&m.joint),
+                    m.multiplier,
+                    m.offset
+                );
+            }
             out.push_str("      </axis>\n");
         }
         let _ = writeln!(
             out,
             "    </joint>\n    <link name=\"{child}\">\n      <pose relative_to=\"{name}\">0 0 0 0 0 0</pose>"
         );
-        if let Some((mass, at)) = center(file, &joint.child) {
-            let (mass, at) = (decimal(mass), decimals(&at));
-            let _ = writeln!(
-                out,
-                "      <inertial>\n        <pose>{at} 0 0 0</pose>\n        <mass>{mass}</mass>\n      </inertial>"
-            );
-        }
+        sdf_inertial(file, &joint.child, &mut out);
         out.push_str("    </link>\n");
     }
     out.push_str("  </model>\n</sdf>\n");
     out
+}
+
+/// The mass of a link.
+fn sdf_inertial(file: &RobotModelFile, link: &str, out: &mut String) {
+    if let Some((mass, at)) = center(file, link) {
+        let (mass, at) = (decimal(mass), decimals(&at));
+        let _ = writeln!(
+            out,
+            "      <inertial>\n        <pose>{at} 0 0 0</pose>\n        <mass>{mass}</mass>\n      </inertial>"
+        );
+    }
 }

@@ -68,5 +68,5 @@ pub use model::{
 pub use nalgebra;
 pub use read::{mesh, source, visual};
 pub use xacro::companions::{Companion, Companions, Reads, Reference, references};
-pub use xacro::origins::{is_xacro, xacro_origins};
+pub use xacro::origins::{is_xacro, xacro_may_name, xacro_origins};
 pub use yaml::origins::{YamlOrigin, patch_yaml, ur_key, yaml_origins};

@@ -25,7 +25,7 @@ pub struct Correct {
     /// Only the position of the tool is to be right: for arms of fewer than six joints
     #[arg(long)]
     position_only: bool,
-    /// Largest change of a turning joint, deg [default: 5.7; 90 for poses]
+    /// Largest change of a turning joint, deg [default: 5.73; 90 for poses]
     #[arg(long, value_name = "DEG")]
     largest_deg: Option<f64>,
     /// Largest change of a sliding joint, mm [default: 50; 1000 for poses]
@@ -64,6 +64,9 @@ pub fn run(console: &Console, options: &Correct) -> Result<ExitCode, CliError> {
             say_absent(console, &done.absent);
         }
         say_assumed(console, done.assumed_temperature_c);
+        if let Some(note) = unused(&done) {
+            say_note(console, &note);
+        }
         say_note(console, &summary(&done));
         say_rejected(console, &robot.file);
         if let Some(note) = known(&done, &robot.file) {
@@ -75,6 +78,19 @@ pub fn run(console: &Console, options: &Correct) -> Result<ExitCode, CliError> {
         0 => ExitCode::Accepted,
         _ => ExitCode::VerdictFail,
     })
+}
+
+/// Columns that the program may have been meant by.
+fn unused(done: &Corrected) -> Option<String> {
+    let first = done.unused.first()?;
+    let more = match done.unused.len() - 1 {
+        0 => String::new(),
+        more => format!(" and {more} more"),
+    };
+    Some(format!(
+        "the positions of `{first}`{more} are not used: the calibration does not know the name, and the tool is `{}`; the joint positions of the table are corrected",
+        done.tool
+    ))
 }
 
 /// What the error of the verdict leaves out: it is of bodies in the tracker's frame, and the program is in that of the root.

@@ -3,11 +3,14 @@
 //!
 //! The geometry of the full model, used without its effects, is wrong by all of them; fitted without, it takes what it can of
 //! their mean. Plain least squares: what is left is missing physics, which a noise level for the joints would swallow.
+//!
+//! The tracker stays where the full model has it: a frame of its own would be written nowhere, and who uses the URDF has the one that is.
 
 use calib_core::{Settings, solve_kept};
 use calib_profile::{Free, JointFree};
 
 use crate::error::PipelineError;
+use crate::estimate::start::Start;
 use crate::formulate::checked::Checked;
 use crate::formulate::formulation::FreeSet;
 use crate::formulate::kinematics::Calibration;
@@ -32,7 +35,11 @@ pub fn refitted(
         return Ok(None);
     }
     let inputs = without_effects(inputs);
-    let mut formulation = ml::state(&inputs, &checked.tracks, &checked.start, FreeSet::Profile);
+    let start = Start {
+        tracker_from_root: solved.robot.tracker_from_root,
+        ..checked.start.clone()
+    };
+    let mut formulation = ml::state(&inputs, &checked.tracks, &start, FreeSet::Profile);
     priors::take_over(fit, &formulation.widths, &mut formulation.problem);
     let solution = solve_kept(&formulation.problem, &fit.solution, &Settings::plain())?;
     let robot = ml::calibration_at(&formulation, &solution.model, &solution.values, &inputs);
@@ -43,14 +50,15 @@ pub fn refitted(
     }))
 }
 
-/// The same profile with nothing free that a URDF cannot hold.
+/// The same profile with nothing free that a URDF cannot hold, and the tracker held.
 fn without_effects(inputs: &Inputs) -> Inputs {
     let mut inputs = inputs.clone();
     let profile = &mut inputs.robot.profile;
     profile.load.stiffness.clear();
+    profile.tracker.from_root = None;
     profile.solve.free.retain(|free| match free {
         Free::Effect(effect) => effect.geometric,
-        Free::Masses => false,
+        Free::Masses | Free::Tracker => false,
         _ => true,
     });
     for exception in profile.solve.joints.values_mut() {

@@ -101,6 +101,15 @@ pub enum EditError {
         block: String,
     },
     #[error(
+        "{file}:{place}: the origin of joint `{joint}` is given by `<xacro:{element}>`: the text does not show which one counts\n  help: write one `<origin>` into the joint itself, or patch the expanded URDF"
+    )]
+    XacroChosen {
+        file: String,
+        place: Place,
+        joint: String,
+        element: String,
+    },
+    #[error(
         "{file}:{place}: the origin or axis of joint `{joint}` takes {value}, which is {}: a new value would change more than this joint\n  help: give this origin a {} of its own, or patch the expanded URDF",
         value_uses(lines, included),
         value.noun()

@@ -162,6 +162,27 @@ pub(crate) fn is_xacro(node: Node<'_, '_>, name: &str) -> bool {
         && node.tag_name().name() == name
 }
 
+/// An element of xacro inside a joint that may give its origin: a branch with one, a block, a call.
+pub(crate) fn gives_origin<'a, 'b>(joint: Node<'a, 'b>) -> Option<Node<'a, 'b>> {
+    let by_xacro = |node: &Node<'_, '_>| {
+        let uri = node.tag_name().namespace();
+        node.is_element() && uri.is_some_and(|uri| uri.contains("xacro"))
+    };
+    joint.children().filter(by_xacro).find(|node| {
+        let origins = || {
+            node.descendants()
+                .any(|inside| is_element(inside, "origin"))
+        };
+        match node.tag_name().name() {
+            "property" => false,
+            "if" | "unless" => {
+                origins() || node.descendants().skip(1).any(|inside| by_xacro(&inside))
+            }
+            _ => true,
+        }
+    })
+}
+
 pub(crate) fn enclosing_macro<'a, 'b>(node: Node<'a, 'b>) -> Option<Node<'a, 'b>> {
     node.ancestors()
         .skip(1)

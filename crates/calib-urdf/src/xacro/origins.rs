@@ -8,7 +8,7 @@ use crate::read::source::OwnAttributes as _;
 use crate::read::source::{child, parse, value_range, xacro_evidence};
 use crate::xacro::companions::Companions;
 use crate::xacro::value::{Context, cells};
-use crate::xacro::{is_expression, is_joint};
+use crate::xacro::{gives_origin, is_expression, is_joint};
 use crate::yaml;
 use nalgebra::{Isometry3, Translation3, Vector3};
 use roxmltree::Node;
@@ -22,6 +22,12 @@ pub type Origins = (Vec<(String, Isometry3<f64>)>, Vec<String>);
 /// [`ReadError`] for a text that is not XML with the root `<robot>`.
 pub fn is_xacro(text: &str, name_for_errors: &str) -> Result<bool, ReadError> {
     Ok(xacro_evidence(&parse(text, name_for_errors)?).is_some())
+}
+
+/// Could xacro turn a name as it is written (`${side}_elbow`) into this one?
+#[must_use]
+pub fn xacro_may_name(written: &str, name: &str) -> bool {
+    super::matches(written, name)
 }
 
 /// The origins of all joints of a xacro, in the order of the text, under the names as written (`${side}_elbow`).
@@ -54,8 +60,9 @@ pub fn xacro_origins(
             Some(origin) => read(&context, origin, attribute),
         };
         let quaternion = origin.is_some_and(|o| o.has_own("quat_xyzw"));
+        let shown = !quaternion && gives_origin(joint).is_none();
         match (numbers("xyz"), numbers("rpy")) {
-            (Some(xyz), Some(rpy)) if !quaternion => found.push((
+            (Some(xyz), Some(rpy)) if shown => found.push((
                 name,
                 Isometry3::from_parts(
                     Translation3::from(Vector3::from(xyz)),

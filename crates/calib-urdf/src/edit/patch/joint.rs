@@ -23,7 +23,16 @@ impl Patcher<'_, '_> {
         let mut written = child(node, "origin");
         if written.is_none() && self.is_xacro {
             match xacro::block(self.context.document, node, call) {
-                Block::None => {}
+                Block::None => {
+                    if let Some(inside) = xacro::gives_origin(node) {
+                        return Err(EditError::XacroChosen {
+                            file: self.file.to_owned(),
+                            place: self.place(inside.range().start),
+                            joint: joint.to_owned(),
+                            element: inside.tag_name().name().to_owned(),
+                        });
+                    }
+                }
                 // The text of one call is that of one joint.
                 Block::Origin(origin) => (written, call) = (Some(origin), None),
                 Block::Hidden(insert) => {
