@@ -7,10 +7,20 @@ use calib_urdf::{ChangeRecord, sha256_hex, source};
 
 use crate::error::ApplyError;
 
-/// Where the record of a changed file lies: `<file>.changes.json` beside it.
+/// Where the record of a changed file lies: `<file>.changes.json` beside it. Of a link, beside what it leads to: whoever names the file by
+/// another way finds it.
 #[must_use]
 pub fn record_path(file: &Path) -> PathBuf {
-    PathBuf::from(format!("{}.changes.json", file.display()))
+    /// Links of links: more lead in a circle.
+    const LINKS: usize = 40;
+    let mut real = file.to_path_buf();
+    for _ in 0..LINKS {
+        let Ok(to) = std::fs::read_link(&real) else {
+            break;
+        };
+        real = real.parent().unwrap_or(Path::new("")).join(to);
+    }
+    PathBuf::from(format!("{}.changes.json", real.display()))
 }
 
 /// Where the record of a change waits that replaces an earlier one, until the file holds it.

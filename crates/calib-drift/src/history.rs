@@ -74,7 +74,9 @@ pub struct History {
     pub calib_history: u32,
     /// The robot.
     pub robot: String,
-    /// In the order of their dates where all have one, otherwise as they were given.
+    /// Whether they are in the order of their dates; else they are as they were given, because not all have one (`2026-11-03`).
+    pub by_date: bool,
+    /// In this order.
     pub calibrations: Vec<Calibration>,
     /// What changed most comes first.
     pub quantities: Vec<Track>,
@@ -93,9 +95,10 @@ pub fn history(reports: &[impl AsRef<Path>]) -> Result<History, DriftError> {
         let evidence = Evidence::of(&report, &name)?;
         all.push((report.identification.date.clone(), evidence));
     }
-    if all.iter().all(|(date, _)| date.is_some()) {
-        // Dates are `2026-11-03`: their order is that of the text.
-        all.sort_by(|a, b| a.0.cmp(&b.0));
+    let dated = |(date, _): &(Option<String>, Evidence)| date.as_deref().and_then(moment);
+    let by_date = all.iter().all(|one| dated(one).is_some());
+    if by_date {
+        all.sort_by_cached_key(|one| dated(one));
     }
     let mut calibrations: Vec<Calibration> = Vec::new();
     for (i, (date, evidence)) in all.iter().enumerate() {
@@ -119,12 +122,32 @@ pub fn history(reports: &[impl AsRef<Path>]) -> Result<History, DriftError> {
     let evidence: Vec<&Evidence> = all.iter().map(|(_, evidence)| evidence).collect();
     Ok(History {
         calib_history: 1,
+        by_date,
         robot: evidence
             .first()
             .map_or_else(String::new, |e| e.robot.clone()),
         calibrations,
         quantities: tracks(&evidence),
     })
+}
+
+/// Year, month, day and the numbers of a time of day: `2026-11-03`, `2026-11-3 9:30`, `2026-11-03T09:30:00Z`. `None` for what is no such
+/// date: of `03.11.2026` nobody knows which number is the month.
+fn moment(date: &str) -> Option<Vec<u32>> {
+    let (day, time) = date
+        .trim()
+        .split_once(['T', 't', ' '])
+        .unwrap_or((date.trim(), ""));
+    let mut numbers: Vec<u32> = Vec::new();
+    for part in day.split('-') {
+        numbers.push(part.parse().ok()?);
+    }
+    let is_date = matches!(numbers[..], [1000..=9999, 1..=12, 1..=31]);
+    let time = time
+        .split(|c: char| !c.is_ascii_digit())
+        .map_while(|part| part.parse::<u32>().ok());
+    numbers.extend(time);
+    is_date.then_some(numbers)
 }
 
 /// The comparison of two calibrations, where it decides anything.
@@ -180,4 +203,35 @@ fn tracks(all: &[&Evidence]) -> Vec<Track> {
     }
     tracks.sort_by(|a, b| b.largest().total_cmp(&a.largest()));
     tracks
+}
+
+#[cfg(test)]
+mod tests {
+    use super::moment;
+
+    #[test]
+    fn dates_are_ordered_as_days_are() {
+        let ordered = [
+            "2025-12-31",
+            "2026-2-1",
+            "2026-10-05",
+            "2026-11-02 9:30",
+            "2026-11-02T10:00:00Z",
+            "2026-11-2 10:00:01",
+        ];
+        for pair in ordered.windows(2) {
+            assert!(moment(pair[0]) < moment(pair[1]), "{pair:?}");
+        }
+        for no_date in [
+            "03.11.2026",
+            "99-01-01",
+            "2026-13-01",
+            "2026-11",
+            "",
+            "spring",
+            "2026-11-03-1",
+        ] {
+            assert_eq!(moment(no_date), None, "{no_date}");
+        }
+    }
 }

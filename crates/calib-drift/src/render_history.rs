@@ -60,6 +60,9 @@ pub fn history_text(history: &History) -> String {
             n => format!("{n} calibrations"),
         }
     );
+    if !history.by_date && history.calibrations.len() > 1 {
+        out += "in the order given: not all have a date as 2026-11-03\n";
+    }
     for (i, of) in history.calibrations.iter().enumerate() {
         let line = format!("{}  {}", of.report, since((i, of)));
         out += &terminal::wrapped(line.trim_end(), &format!("{}  ", named(i, of)), "      ");

@@ -69,7 +69,8 @@ pub fn members(fleet: &str, earlier: Option<&Path>) -> Result<Vec<Member>, Batch
     }
     for member in &mut members {
         let last = earlier.map(|folder| folder.join(super::ROBOTS).join(&*member.name));
-        let there = |folder: &PathBuf| folder.join(calib_report::REPORT).is_file();
+        // A robot that failed then has a folder without a report: it is named among those that cannot be compared.
+        let there = |folder: &PathBuf| folder.is_dir();
         let last = last.filter(there).map(PathBuf::into_boxed_path);
         member.earlier = member.earlier.take().or(last);
     }

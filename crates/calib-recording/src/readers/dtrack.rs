@@ -9,7 +9,8 @@
 //! 3d 1 [7 1.000][x y z]                                      a marker of no body
 //! ```
 //!
-//! A marker of no body has a number that another may have later. The only one of a frame is also the marker `marker`.
+//! A marker of no body has a number that another may have later. The only one of a frame is the marker `marker`, unless several are in view
+//! more often than by a reflection now and then: then all have their numbers.
 //!
 //! In `6d` lines a lost body is absent; so is everything in a frame without the line. Angles are ignored, the matrix
 //! has six decimals and is made orthonormal. Unknown lines are skipped, as the protocol asks.
@@ -37,6 +38,9 @@ pub(super) const READER: Reader = Reader {
 /// Name of the only marker of no body in a frame.
 const ALONE: &str = "marker";
 
+/// Frames with several markers of no body, of those with any, up to which one marker and a reflection are meant.
+const REFLECTIONS: f64 = 0.1;
+
 /// Half a day: `ts` counts from midnight, so going back by more than this is the next day.
 const HALF_DAY: f64 = 43_200.0;
 const DAY: f64 = 86_400.0;
@@ -60,6 +64,8 @@ struct Log {
     markers: BTreeMap<u64, MarkerStream>,
     /// The only single marker of a frame, where there is one.
     alone: Vec<MarkerSample>,
+    /// Frames with several.
+    several: usize,
     samples: usize,
     dense: usize,
     backwards: Vec<u64>,
@@ -194,6 +200,7 @@ impl Log {
             "3d" => {
                 let count = fields.count("the number of markers")?;
                 let sample = self.frames.len().saturating_sub(1);
+                self.several += usize::from(count > 1);
                 for _ in 0..count {
                     let id = fields.block("id qu")?;
                     let xyz = fields.block("x y z")?;
@@ -470,9 +477,23 @@ impl Log {
             ..Timeline::default()
         });
         recording.bodies = self.bodies.into_values().collect();
-        recording.markers = self.markers.into_values().collect();
-        if !self.alone.is_empty() {
+        let is_seen = |sample: &MarkerSample| matches!(sample, MarkerSample::Measured(_));
+        let single = self.alone.iter().filter(|sample| is_seen(sample)).count();
+        let is_one = self.several as f64 <= REFLECTIONS * (single + self.several) as f64;
+        if single > 0 && is_one {
             self.alone.resize(n, MarkerSample::Lost);
+            // No point twice.
+            for marker in self.markers.values_mut() {
+                let samples = marker.samples.iter_mut().zip(&self.alone);
+                samples
+                    .filter(|(_, alone)| is_seen(alone))
+                    .for_each(|(sample, _)| *sample = MarkerSample::Lost);
+            }
+            self.markers
+                .retain(|_, marker| marker.samples.iter().any(is_seen));
+        }
+        recording.markers = self.markers.into_values().collect();
+        if single > 0 && is_one {
             recording.markers.push(MarkerStream {
                 name: ALONE.to_string(),
                 body: None,

@@ -251,7 +251,47 @@ fn dtrack_absence_is_lost_and_midnight_goes_on() {
             .max()
             < 1e-6
     );
-    assert!(recording.markers[0].unlabeled);
+    let markers = |text: &str| -> Vec<(String, Vec<bool>)> {
+        let seen = |sample: &MarkerSample| matches!(sample, MarkerSample::Measured(_));
+        let recording = read("a.dtrack", text.as_bytes());
+        let of = |m: &calib_recording::MarkerStream| {
+            (m.name.clone(), m.samples.iter().map(seen).collect())
+        };
+        recording.markers.iter().map(of).collect()
+    };
+    let frame = |ids: &[u32]| {
+        let points: String = ids
+            .iter()
+            .map(|id| format!(" [{id} 1.000][{id} 2 3]"))
+            .collect();
+        format!("3d {}{points}\n", ids.len())
+    };
+    let log = |frames: &[&[u32]]| -> String {
+        let frames = frames.iter().enumerate();
+        frames
+            .map(|(i, ids)| format!("fr {}\nts {i}\n{}", i + 1, frame(ids)))
+            .collect()
+    };
+    // No point is read twice: the only marker, by whatever numbers, is one; of two both have theirs, also where one is hidden.
+    assert_eq!(
+        markers(&log(&[&[1], &[1], &[4]])),
+        [("marker".to_owned(), vec![true; 3])]
+    );
+    assert_eq!(
+        markers(&log(&[&[1, 2], &[1], &[1, 2]])),
+        [
+            ("marker_1".to_owned(), vec![true; 3]),
+            ("marker_2".to_owned(), vec![true, false, true])
+        ]
+    );
+    // A reflection in one of ten frames.
+    let mut with_one: Vec<&[u32]> = vec![&[1]; 10];
+    with_one[4] = &[1, 9];
+    let found = markers(&log(&with_one));
+    let names: Vec<&str> = found.iter().map(|(name, _)| name.as_str()).collect();
+    assert_eq!(names, ["marker_1", "marker_9", "marker"]);
+    let twice = (0..10).filter(|i| found[0].1[*i] && found[2].1[*i]).count();
+    assert_eq!(twice, 0);
 }
 
 #[test]
