@@ -1,8 +1,6 @@
 //! What the URDF alone says: which links move together, where chains end, and how far the robot reaches.
 
-use std::collections::BTreeSet;
-
-use calib_urdf::{JointId, JointKind, LinkId, Problem, RobotModel, doubt};
+use calib_urdf::{JointId, JointKind, LinkId, RobotModel, doubt};
 
 use crate::fact::About;
 
@@ -127,25 +125,18 @@ pub fn joints(model: &RobotModel) -> About {
         let names = names(model, &of).into_iter();
         names.map(str::to_owned).collect()
     };
-    let warnings = model.warnings().iter();
-    let reversed: BTreeSet<&str> = warnings
-        .filter_map(|found| match &found.problem {
-            Problem::LimitsReversed { joint, .. } => Some(joint.as_str()),
-            _ => None,
-        })
-        .collect();
-    let name = |j: &JointId| model.joint(*j).name.as_str();
+    let reversed = |j: &JointId| calib_urdf::range::are_reversed(model, *j);
     let endless = |j: &JointId| matches!(model.joint(*j).kind, JointKind::Continuous { .. });
     let in_degrees = doubt::limits_in_degrees(model);
     About::Joints {
         moving: moving.len(),
         // A joint that turns without end says so.
         unlimited: named(&|j| {
-            doubt::range(model.joint(*j)).is_none() && !endless(j) && !reversed.contains(name(j))
+            doubt::range(model.joint(*j)).is_none() && !endless(j) && !reversed(j)
         }),
-        reversed: named(&|j| reversed.contains(name(j))),
+        reversed: named(&reversed),
         endless: named(&endless),
-        no_range: named(&|j| has_no_range(model, *j)),
+        no_range: named(&|j| has_no_range(model, *j) && !reversed(j)),
         in_degrees: named(&|j| in_degrees.contains(j)),
     }
 }

@@ -43,6 +43,8 @@ pub struct Scene {
     pub always: Vec<(usize, usize)>,
     /// Pairs of parts with one part between them that are nearer than the clearance in nearly all postures: they may be, but must not touch.
     pub close: Vec<(usize, usize)>,
+    /// Pairs of parts with one joint between them that are compared: they are near it by design, and must not touch.
+    next: BTreeSet<(usize, usize)>,
     /// Distance that is kept, m.
     pub clearance: f64,
     keep_outs: BTreeMap<String, KeepOut>,
@@ -53,6 +55,8 @@ pub struct Scene {
 
 /// Pairs that touch in more than this share of all postures of the joint box do so by the size of their capsules.
 const ALWAYS: f64 = 0.9;
+/// The same of parts with one joint between them, which mostly overlap there; those that do not are folded onto each other where they do.
+const ALWAYS_NEXT: f64 = 0.5;
 
 impl Scene {
     /// From the shapes of the links; `postures` (over the joint box) tell which pairs touch always. What no joint of the box moves is compared with
@@ -95,7 +99,7 @@ impl Scene {
             for b in &parts[i + 1..] {
                 // What no joint of the box moves against each other is as it is in every posture.
                 let rigid = carried[a] == carried[b];
-                if !rigid && !neighbors.contains(&(*a, *b)) {
+                if !rigid {
                     pairs.push((*a, *b));
                 }
             }
@@ -105,6 +109,7 @@ impl Scene {
             pairs,
             always: Vec::new(),
             close: Vec::new(),
+            next: neighbors.iter().copied().collect(),
             keep_outs: spec.keep_outs.clone(),
             ground: spec.ground,
             clearance: spec.clearance,
@@ -136,16 +141,19 @@ impl Scene {
                 }
             }
         }
-        let limit = ALWAYS * postures.len() as f64;
-        let mostly = |count: usize| !postures.is_empty() && count as f64 > limit;
+        let more = |count: usize, share: f64| {
+            !postures.is_empty() && count as f64 > share * postures.len() as f64
+        };
+        let mostly = |count: usize| more(count, ALWAYS);
         let pairs = std::mem::take(&mut self.pairs);
         for (pair, [touch, close]) in pairs.into_iter().zip(touching) {
-            if mostly(touch) {
+            let next = self.next.contains(&pair);
+            if mostly(touch) || (next && more(touch, ALWAYS_NEXT)) {
                 self.always.push(pair);
                 continue;
             }
             self.pairs.push(pair);
-            if mostly(close) && next_but_one(pair) {
+            if mostly(close) && next_but_one(pair) && !next {
                 self.close.push(pair);
             }
         }
@@ -174,7 +182,7 @@ impl Scene {
 
     /// By how much less than the clearance a pair of parts may be apart, m.
     fn allowed(&self, pair: (usize, usize)) -> f64 {
-        if self.close.contains(&pair) {
+        if self.close.contains(&pair) || self.next.contains(&pair) {
             self.clearance
         } else {
             0.0

@@ -310,7 +310,7 @@ pub fn note(note: &Note) -> String {
             of_shapes(shapes)
         ),
         Note::PairsNotCompared { pairs } => format!(
-            "Not compared, because their capsules overlap in nearly all postures: {}. Watch them in the first run.",
+            "Not compared, because their capsules overlap in most postures: {}. Watch them in the first run.",
             of_pairs(pairs)
         ),
         Note::PairsAlwaysClose { pairs } => format!(

@@ -1,12 +1,24 @@
 //! Where the joints that move on their own may stand: within their limits and within those of the joints that follow them.
 
-use crate::{Joint, JointId, JointKind, MimicLaw, RobotModel, doubt};
+use crate::{Joint, JointId, JointKind, MimicLaw, Problem, RobotModel, doubt};
 
 /// Range of a joint that moves on its own, rad or m: its limits, narrowed by those of all joints that follow it. `None`: nothing limits it.
-/// Where the limits leave nothing, the lower end is not below the upper one.
+/// Where the limits leave nothing, the lower end is not below the upper one; so where they are exchanged, since nobody knows which are meant.
 #[must_use]
 pub fn range(model: &RobotModel, joint: JointId) -> Option<(f64, f64)> {
-    narrowed(model, joint, limits(model.joint(joint)))
+    match are_reversed(model, joint) {
+        true => Some((0.0, 0.0)),
+        false => narrowed(model, joint, limits(model.joint(joint))),
+    }
+}
+
+/// Whether the lower limit of a joint is written above the upper one.
+#[must_use]
+pub fn are_reversed(model: &RobotModel, joint: JointId) -> bool {
+    let name = &model.joint(joint).name;
+    model.warnings().iter().any(
+        |found| matches!(&found.problem, Problem::LimitsReversed { joint, .. } if joint == name),
+    )
 }
 
 /// A range of a joint that moves on its own, narrowed by the limits of all joints that follow it.

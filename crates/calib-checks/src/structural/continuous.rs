@@ -20,7 +20,7 @@ use rayon::prelude::*;
 use statrs::distribution::{ContinuousCDF, FisherSnedecor};
 
 use super::Options;
-use super::apply::apply_all;
+use super::apply::{apply, apply_all};
 use super::candidates::span;
 use super::data::Data;
 use super::hypothesis::{Hypothesis, Scope, Scoped};
@@ -36,6 +36,8 @@ const RELINEARIZATIONS: usize = 3;
 const LEAST_FREEDOM: f64 = 8.0;
 /// Tests that are scored by one task.
 const CHUNK: usize = 120;
+/// Zeros that are corrected, or steps of one that is far off.
+const ZEROS: usize = 3;
 /// Fall of T from the best within which another test explains the data as well (log-likelihood difference 3).
 const AS_GOOD: f64 = 6.0;
 
@@ -73,6 +75,7 @@ impl Test {
                 seconds: k,
             },
             Self::Latency { joint } => Hypothesis::Latency { joint, seconds: k },
+            Self::Zero { joint } => Hypothesis::Zero { joint, offset: k },
         }
     }
 }
@@ -168,11 +171,47 @@ fn left_with(
     Some(screen(&at_map, &[]))
 }
 
+/// What is significant, once zeros that are off by more than the priors allow, and explain more, are corrected: with the wrong posture the
+/// motion of one joint looks like a part of another's.
 fn demanded(data: &Data, screened: &[SampleIndex], options: &Options) -> Option<Continuous> {
     let tests = tests(data);
     if tests.is_empty() {
         return None;
     }
+    let mut corrected = None;
+    for _ in 0..=ZEROS {
+        match strongest(
+            corrected.as_ref().unwrap_or(data),
+            screened,
+            &tests,
+            options,
+        )? {
+            Demanded::Fault(found) => return Some(found),
+            Demanded::Zero(zero) => {
+                let all = Scoped {
+                    hypothesis: zero,
+                    scope: Scope::All,
+                };
+                corrected = Some(apply(&all, corrected.as_ref().unwrap_or(data)));
+            }
+        }
+    }
+    None
+}
+
+/// What explains most.
+enum Demanded {
+    Fault(Continuous),
+    /// The zero of a joint: no continuous fault.
+    Zero(Hypothesis),
+}
+
+fn strongest(
+    data: &Data,
+    screened: &[SampleIndex],
+    tests: &[Test],
+    options: &Options,
+) -> Option<Demanded> {
     let (part, part_screened) = fewer(data, screened);
     let (part, deviation, sigma) = relinearized(part, &part_screened, options, RELINEARIZATIONS)?;
     let noise = noise_ratio(&part, &deviation, sigma, &part_screened, options)?;
@@ -181,19 +220,26 @@ fn demanded(data: &Data, screened: &[SampleIndex], options: &Options) -> Option<
         chain: part.chain,
         ..data.clone()
     };
-    let model = Model::new(&at_map, &tests, screened);
+    let model = Model::new(&at_map, tests, screened);
     let [sums, plain] = model.sums_of([lambda, 0.0]);
     let map = solve(&model, &sums, sigma, &deviation, options)?;
-    let mut scored = score_tests(&model, &sums, &map);
+    let is_zero = |t: usize| matches!(tests[t], Test::Zero { .. });
+    let (zeros, mut scored): (Vec<_>, Vec<_>) = score_tests(&model, &sums, &map)
+        .into_iter()
+        .partition(|s| is_zero(s.0));
     scored.sort_by(|a, b| b.1.total_cmp(&a.1));
-    whole_recording_first(&tests, &mut scored);
+    whole_recording_first(tests, &mut scored);
     let &(which, statistic, factor, h) = scored.first()?;
     if map.freedom < LEAST_FREEDOM {
         return None;
     }
-    let threshold = threshold(options.false_alarm / tests.len() as f64, map.freedom);
+    let threshold = threshold(options.false_alarm / scored.len() as f64, map.freedom);
     if statistic < threshold {
         return None;
+    }
+    let zero = zeros.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
+    if let Some((joint, _, offset, _)) = zero.filter(|zero| zero.1 > statistic) {
+        return Some(Demanded::Zero(tests[joint].hypothesis(offset)));
     }
     let cross = plain.cross.view((0, which), (model.registration, 1));
     let own = DMatrix::from_element(1, 1, plain.own[which]);
@@ -204,14 +250,14 @@ fn demanded(data: &Data, screened: &[SampleIndex], options: &Options) -> Option<
     }
     let as_good = |s: &&(usize, f64, f64, f64)| statistic - s.1 < AS_GOOD;
     let alternatives = scored[1..].iter().take_while(as_good);
-    Some(Continuous {
+    Some(Demanded::Fault(Continuous {
         hypothesis: tests[which].hypothesis(factor),
         sigma: map.sigma / h.sqrt(),
         statistic,
         threshold,
         effect,
         alternatives: alternatives.map(|s| tests[s.0].hypothesis(s.2)).collect(),
-    })
+    }))
 }
 
 /// Of a joint that is late and a recording that is late as a whole, the second is more common: the first must explain more.
@@ -245,6 +291,7 @@ fn tests(data: &Data) -> Vec<Test> {
         let mut rates = data.rates.iter().flatten();
         rates.any(|of_row| of_row.get(joint.0).is_some_and(|rate| *rate != 0.0))
     };
+    tests.extend(joints.iter().map(|joint| Test::Zero { joint: *joint }));
     let moving: Vec<JointIndex> = joints.into_iter().filter(moves).collect();
     tests.extend(timed.into_iter().map(|recording| Test::Lag { recording }));
     // Of one joint that moves it is the lag of the recording.

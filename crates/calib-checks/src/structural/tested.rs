@@ -1,7 +1,7 @@
 //! Columns of the score tests: each is a reading times the derivative by a reading, so none is ever written out.
 //!
 //! ```text
-//! G_js = −q_s D_j  of a gain or coupling,   G = −Σ_j q̇_j D_j  of a lag, −q̇_j D_j of a latency         (1)
+//! G_js = −q_s D_j  of a gain or coupling,   G = −Σ_j q̇_j D_j  of a lag, −q̇_j D_j of a latency, −D_j of a zero     (1)
 //! Dᵀ V⁻¹ A = (1 + λ DᵀD)⁻¹ Dᵀ A,            V = 1 + λ D Dᵀ                                            (2)
 //! ```
 //!
@@ -24,6 +24,8 @@ pub(crate) enum Test {
     Lag { recording: RecordingIndex },
     /// The joint's readings as they were k seconds later.
     Latency { joint: JointIndex },
+    /// `reading_joint += k`, by more than the prior of the geometry allows.
+    Zero { joint: JointIndex },
 }
 
 /// What the columns of an instant's tests depend on.
@@ -68,6 +70,7 @@ impl<'a> TestedSums<'a> {
                 Test::Reading { joint, source } => {
                     self.add_joint(t, *joint, -instant.readings[source.0], noise, &whitened);
                 }
+                Test::Zero { joint } => self.add_joint(t, *joint, -1.0, noise, &whitened),
                 Test::Latency { joint } => {
                     let rate = instant.rates.and_then(|rates| rates.get(joint.0));
                     let by = -rate.copied().unwrap_or(0.0);
@@ -125,6 +128,9 @@ mod tests {
         tests.extend((0..joints).map(|j| Test::Latency {
             joint: JointIndex(j),
         }));
+        tests.extend((0..joints).map(|j| Test::Zero {
+            joint: JointIndex(j),
+        }));
         for (rows, lambda, weight) in [(3, 0.7, 1.0), (12, 0.7, 0.06), (6, 0.0, 1.0)] {
             let mut sums = TestedSums::new(lambda, width, &tests);
             let mut expected = DMatrix::<f64>::zeros(width, tests.len());
@@ -150,6 +156,7 @@ mod tests {
                             &d * -DVector::from_column_slice(&rates)
                         }
                         Test::Latency { joint } if n != 4 => d.column(joint.0) * -rates[joint.0],
+                        Test::Zero { joint } => -d.column(joint.0),
                         Test::Lag { .. } | Test::Latency { .. } => DVector::zeros(rows),
                     };
                     let whitened = &inverse * &column;

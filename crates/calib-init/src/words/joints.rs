@@ -35,7 +35,7 @@ pub(super) fn sentences(about: &About) -> String {
     }
     if !reversed.is_empty() {
         text += &format!(
-            " The lower limit of {} is above the upper one, so that the joint counts as unlimited: exchange `lower` and `upper` in the URDF.",
+            " The lower limit of {} is above the upper one, so that no planned posture moves the joint: exchange `lower` and `upper` in the URDF.",
             quoted(reversed)
         );
     }
