@@ -207,6 +207,19 @@ fn a_fleet_is_calibrated_and_compared_with_last_time() {
     assert_eq!(summary["drift"]["alarms"][0]["name"], "r003");
     assert_eq!(summary["drift"]["alarms"][0]["familywise"], true);
 
+    // Who failed last time cannot be compared, and is named.
+    let mended = [
+        "batch",
+        "old/*/r.yaml",
+        "--earlier",
+        "tonight",
+        "--out",
+        "mended",
+    ];
+    dir.calib_with(&mended).expect(0);
+    let not_compared = &dir.json("mended/fleet.json")["drift"]["not_compared"];
+    assert_eq!(*not_compared, serde_json::json!(["r004", "r005"]));
+
     // With and without a comparison.
     for page in ["last/fleet.html", "tonight/fleet.html"] {
         for checker in ["html", "axe"] {

@@ -375,6 +375,104 @@ fn a_gantry_whose_joints_are_called_x_y_and_z_is_read() {
     assert_eq!(rows(&ran.stdout).len(), rows(&own).len());
 }
 
+/// A wrist whose zero is off by more than the priors allow turns what the slides seem to do: no slide takes a share of another one.
+#[test]
+fn a_zero_that_is_far_off_is_no_share() {
+    let mut shares = Vec::new();
+    for seed in 0..8_u64 {
+        let mut dir = gantry(None, 40 + seed);
+        let off = 0.3 + 0.03 * seed as f64;
+        for file in ["gantry/poses.csv", "gantry/checks.csv"] {
+            let text = dir.read(file);
+            let mut lines: Vec<String> = text.lines().map(str::to_owned).collect();
+            for line in &mut lines[1..] {
+                let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+                let q: f64 = cells[3].parse().expect("a number");
+                cells[3] = format!("{:.9}", q + off);
+                *line = cells.join(",");
+            }
+            dir = dir.file(file, lines.join("\n") + "\n");
+        }
+        // Errors of the drawing beyond the prior are left to the fit.
+        let dir = dir.file(
+            "gantry.yaml",
+            PROFILE.replace("  free: [bodies, tracker, joint_offsets, joint_axes]\n", ""),
+        );
+        let ran = dir.calib_with(&["check", "gantry.yaml", "--json"]);
+        let said: Value = serde_json::from_str(&ran.stdout).expect("JSON");
+        let found = said["findings"].as_array().into_iter().flatten();
+        let of_share =
+            |f: &&Value| matches!(f["id"].as_str(), Some("joint-coupling" | "joint-gain"));
+        shares.extend(found.filter(of_share).map(|f| format!("{off}: {f}")));
+    }
+    assert!(shares.is_empty(), "{shares:#?}");
+}
+
+/// The first profile reads joints that are called like coordinates in the robot's own log, and with a word before them.
+#[test]
+fn init_reads_joints_that_are_called_like_coordinates() {
+    let named = |text: &str, before: &str| {
+        ["x", "y", "z"].iter().fold(text.to_owned(), |text, axis| {
+            let upper = axis.to_uppercase();
+            text.replace(&format!("g{axis}_m"), &format!("{before}{upper}_m"))
+                .replace(&format!("\"g{axis}\""), &format!("\"{upper}\""))
+        })
+    };
+    let own = gantry(None, 3);
+    for before in ["", "actual_"] {
+        let dir = Scratch::new()
+            .file("gantry.urdf", named(&urdf(), ""))
+            .file("poses.csv", named(&own.read("gantry/poses.csv"), before))
+            .file("checks.csv", named(&own.read("gantry/checks.csv"), before));
+        let call = [
+            "init",
+            "gantry.urdf",
+            "poses.csv",
+            "checks.csv",
+            "--out",
+            "it.yaml",
+        ];
+        let made = dir.calib_with(&call);
+        assert_eq!(made.code, 0, "{before}: {}{}", made.stdout, made.stderr);
+        dir.calib(["run", "it.yaml", "--out", "out"]).expect(0);
+        assert!(held_out(&dir.json("out/report.json")) < 1e-3, "{before}");
+    }
+    // The robot's own log alone: the readers know its joints.
+    let text = named(&own.read("gantry/poses.csv"), "");
+    let (joints, markers): (Vec<String>, Vec<String>) = text
+        .lines()
+        .map(|line| {
+            let cells: Vec<&str> = line.split(',').collect();
+            (cells[..5].join(","), cells[5..].join(","))
+        })
+        .unzip();
+    let with_time = |rows: &[String], before: f64| {
+        let rows = rows.iter().enumerate();
+        let rows = rows.map(|(i, row)| match i {
+            0 => format!("t_s,{row}"),
+            i => format!("{:.2},{row}", before + 5.0 * i as f64),
+        });
+        rows.collect::<Vec<_>>().join("\n") + "\n"
+    };
+    let dir = Scratch::new()
+        .file("gantry.urdf", named(&urdf(), ""))
+        .file("robot.csv", with_time(&joints, 0.0))
+        .file("tracker.csv", with_time(&markers, 0.0));
+    let made = dir.calib_with(&[
+        "init",
+        "gantry.urdf",
+        "tracker.csv",
+        "robot.csv",
+        "--out",
+        "it.yaml",
+    ]);
+    assert!(
+        !made.stderr.contains("no column is a joint"),
+        "{}",
+        made.stderr
+    );
+}
+
 /// A sliding joint in meters beside a tracker in millimeters, without a unit in any name.
 #[test]
 fn init_finds_two_units_of_length_in_one_table() {

@@ -210,6 +210,73 @@ fn the_re_read_file_has_the_reported_transforms() {
     }
 }
 
+/// Rows of a table by the names of its columns, without those that lost a cell.
+fn table(text: &str) -> Vec<std::collections::BTreeMap<String, f64>> {
+    let text: String = text
+        .lines()
+        .filter(|l| !l.starts_with('#'))
+        .map(|l| format!("{l}\n"))
+        .collect();
+    let mut reader = csv::Reader::from_reader(text.as_bytes());
+    let header = reader.headers().expect("a header").clone();
+    let rows = reader.records().map(|row| {
+        let row = row.expect("a row");
+        let cells = header.iter().zip(row.iter());
+        cells
+            .filter_map(|(name, cell)| Some((name.to_owned(), cell.parse().ok()?)))
+            .collect()
+    });
+    rows.collect()
+}
+
+/// The URDF that is used without effects is as good as the report says where the tracker stands as the model file and the scene have it.
+#[test]
+fn the_urdf_alone_predicts_as_stated_from_the_tracker_that_is_published() {
+    let run = finished("justin", "ml");
+    let text = run.dir.read("out/justin.calibrated.alone.urdf");
+    let model = RobotModel::from_urdf_text(&text, "alone").expect("a robot");
+    let file = run.dir.json("out/justin.calibrated.model.json");
+    let numbers = |of: &Value| -> Vec<f64> {
+        of.as_array()
+            .expect("a list")
+            .iter()
+            .filter_map(Value::as_f64)
+            .collect()
+    };
+    let pose = &file["tracker_from_root"];
+    let (t, q) = (numbers(&pose["xyz_m"]), numbers(&pose["quat_xyzw"]));
+    let turn = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(
+        q[3], q[0], q[1], q[2],
+    ));
+    let tracker_from_root = nalgebra::Isometry3::from_parts([t[0], t[1], t[2]].into(), turn);
+    let (mut sum, mut count) = (0.0, 0_u32);
+    for row in table(&run.dir.read("robots/justin/torso_tests.csv")) {
+        let mut q = model.zero_positions();
+        for id in model.independent_joints() {
+            let degrees = row.get(&format!("{}_deg", model.joint(id).name));
+            q[id.index()] = degrees.map_or(0.0, |d| d.to_radians());
+        }
+        let links = model.forward_kinematics(&q);
+        for body in ["heT", "haT"] {
+            let seen: Vec<f64> = ["x", "y", "z"]
+                .iter()
+                .filter_map(|a| row.get(&format!("{body}.{a}_m")).copied())
+                .collect();
+            let [x, y, z] = seen[..] else { continue };
+            let at = tracker_from_root * links[model.link_id(body).expect("added").index()];
+            sum += (at.translation.vector - nalgebra::Vector3::new(x, y, z)).norm_squared();
+            count += 1;
+        }
+    }
+    let rms = (sum / f64::from(count)).sqrt();
+    let stated = &run.report["verification"]["held_out"]["urdf_refitted"]["rms_m"];
+    let stated = stated.as_f64().expect("a number");
+    assert!(
+        count > 100 && (rms / stated - 1.0).abs() < 0.02,
+        "{rms} {stated}, {count} positions"
+    );
+}
+
 #[test]
 fn reverting_gives_the_original_bytes() {
     for robot in ROBOTS {
@@ -287,4 +354,31 @@ fn the_difference_is_shown() {
     }
     let same = dir.calib(["diff", "a.urdf", "a.urdf"]).expect(0);
     insta::assert_snapshot!("diff_of_the_same", same.stdout);
+}
+
+/// Changed through a link, the file itself goes back, and the other way round.
+#[cfg(unix)]
+#[test]
+fn the_record_of_a_change_is_found_by_every_name_of_the_file() {
+    let run = &finished("ripley", "ml").dir;
+    let original = robot_text("ripley").0;
+    let dir = Scratch::new().file("in/real.urdf", &original);
+    for name in [
+        "ripley.calibrated.urdf",
+        "ripley.calibrated.urdf.changes.json",
+        "report.json",
+        "ripley.calibrated.model.json",
+    ] {
+        let path = format!("out/{name}");
+        std::fs::create_dir_all(dir.path("out")).expect("a folder");
+        std::fs::write(dir.path(&path), run.read(&path)).expect("written");
+    }
+    std::os::unix::fs::symlink("in/real.urdf", dir.path("link.urdf")).expect("a link");
+    for (applied, reverted) in [("link.urdf", "in/real.urdf"), ("in/real.urdf", "link.urdf")] {
+        dir.calib(["apply", "out", applied, "--in-place"]).expect(0);
+        assert_ne!(dir.read("in/real.urdf"), original);
+        dir.calib(["revert", reverted, "--in-place"]).expect(0);
+        assert_eq!(dir.read("in/real.urdf"), original, "{applied}");
+        assert!(dir.path("link.urdf").is_symlink());
+    }
 }

@@ -157,12 +157,22 @@ fn stem_of(column: &str) -> &str {
     stem.strip_prefix(JOINT).unwrap_or(stem)
 }
 
+/// Whether a column is called as a joint, or by the same words beside such as `actual`: `actual_X`.
+fn is_named(joint: &str, stem: &str) -> bool {
+    let key = name::key(joint);
+    let alike = || key == name::key(stem) && key.chars().any(char::is_alphabetic);
+    // A `pos_x` is as well that of a marker.
+    let of_place = || name::words(stem).iter().any(|word| word.starts_with("pos"));
+    joint == stem || (alike() && !of_place() && !name::is_no_position(stem))
+}
+
 /// Columns with the names of joints that are called like coordinates: those with [`JOINT`] before them, and the others.
 fn like_coordinates(model: &RobotModel, header: &Header) -> (BTreeSet<usize>, BTreeSet<usize>) {
     let of_joint = |i: &usize| {
         let column = &header.names[*i];
         let mut joints = model.independent_joints();
-        joints.any(|j| model.joint(j).name == stem_of(column) && fits(model, j, header, *i))
+        joints
+            .any(|j| is_named(&model.joint(j).name, stem_of(column)) && fits(model, j, header, *i))
     };
     let all = (0..header.names.len()).filter(of_joint);
     all.partition(|i| header.names[*i].starts_with(JOINT))

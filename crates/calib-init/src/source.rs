@@ -60,7 +60,7 @@ impl Source {
                 found,
             });
         }
-        let own = read_bytes(&file.shown, &file.bytes, &ReadOptions::default());
+        let own = read_bytes(&file.shown, &file.bytes, &of_robot(model));
         let table = header(&file.bytes);
         let guess = table.as_ref().map(|table| columns::guess(model, table));
         match (own, guess) {
@@ -94,7 +94,7 @@ impl Source {
         };
         let options = ReadOptions {
             columns: label.map(labeled),
-            ..ReadOptions::default()
+            ..of_robot(model)
         };
         let own = read_bytes(&file.shown, &file.bytes, &options);
         own.is_ok_and(|recording| {
@@ -229,6 +229,15 @@ fn lost_by_number(recording: &Recording) -> Vec<About> {
     samples.into_iter().map(of).collect()
 }
 
+/// Columns `X_m`, `Y_m` and `Z_m` are those of a gantry's joints of these names.
+fn of_robot(model: &RobotModel) -> ReadOptions {
+    let joints = model.independent_joints();
+    ReadOptions {
+        joints: joints.map(|j| model.joint(j).name.clone()).collect(),
+        ..ReadOptions::default()
+    }
+}
+
 fn mapped(file: &File, map: &ColumnMap) -> Result<Recording, InitError> {
     let options = ReadOptions {
         columns: Some(map.clone()),
@@ -257,7 +266,9 @@ fn suffices(model: &RobotModel, recording: &Recording, guess: Option<&Guess>) ->
     // A device's own format has its names in several lines, of which a map would see one.
     let of_device = recording.meta.format != "csv";
     let all_known = known == recording.joints.len();
+    // Three joints that are called like coordinates are no marker.
+    let finds_all = tracked >= things || known >= joints + 3 * (things - tracked);
     all_known
-        && (of_device || (known >= joints && tracked >= things && recording.bodies.len() >= turns))
+        && (of_device || (known >= joints && finds_all && recording.bodies.len() >= turns))
         && known + tracked > 0
 }

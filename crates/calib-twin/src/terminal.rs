@@ -29,7 +29,8 @@ pub fn summary(twin: &Twin, folder: &str) -> String {
         twin.robot, twin.trials
     );
     let mut line = |name: &str, said: &str| {
-        let first = format!("{name:<LEFT$}");
+        // A long name keeps a blank behind it.
+        let first = format!("{name:<width$} ", width = LEFT - 1);
         text += &wrapped(said, &first, &" ".repeat(LEFT));
     };
     if let Some(said) = resembles(twin) {

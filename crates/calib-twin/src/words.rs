@@ -164,7 +164,11 @@ fn small(size: f64, unit: Unit) -> String {
 pub fn of_power(power: &Power) -> String {
     match &power.other {
         Some(other) => format!("{} with {other}", power.joint),
-        None => power.joint.clone(),
+        None => match power.name.rsplit('_').next() {
+            // Which phase it has decides how well it is seen.
+            Some(part @ ("sin" | "cos")) => format!("{}, {part} part", power.joint),
+            _ => power.joint.clone(),
+        },
     }
 }
 

@@ -393,6 +393,84 @@ fn sdformat_and_urdfdom_accept_what_is_written() {
     }
 }
 
+/// Joints that follow others, and the mass of every link, the root's too; masses that the fit assumed are in no file.
+#[test]
+fn mimics_and_masses_are_in_the_sdf_and_no_masses_that_were_assumed() {
+    let mut r = rng(6);
+    let mut file = robot(&mut r, 5, true, Effects::All);
+    let leader = read(file.clone()).model.joints()[0].name.clone();
+    let moves = |j: &&mut calib_model::file::ModelJoint| j.name != leader && j.axis.is_some();
+    let follower = file.joints.iter_mut().rfind(moves).expect("one more");
+    follower.effects.clear();
+    follower.mimic = Some(calib_model::file::ModelMimic {
+        joint: leader,
+        multiplier: -1.5,
+        offset: 0.25,
+    });
+    for link in &mut file.links {
+        (link.mass_kg, link.first_moment_kg_m) = (1.5, [0.0, 0.0, 0.15]);
+    }
+    let total = 1.5 * file.links.len() as f64;
+    let sdf = |file: &RobotModelFile| {
+        let text = export(&read(file.clone()), Target::Sdf, None, None)
+            .expect("written")
+            .text;
+        let masses: f64 = roxmltree::Document::parse(&text)
+            .expect("XML")
+            .descendants()
+            .filter(|n| n.has_tag_name("mass"))
+            .map(|n| {
+                n.text()
+                    .expect("a number")
+                    .parse::<f64>()
+                    .expect("a number")
+            })
+            .sum();
+        (text, masses)
+    };
+    let (text, masses) = sdf(&file);
+    assert!((masses - total).abs() < 1e-9, "{masses} of {total} kg");
+    assert!(text.contains("<sdf version=\"1.11\">"), "{text}");
+    let document = roxmltree::Document::parse(&text).expect("XML");
+    for joint in file.joints.iter().filter(|j| j.mimic.is_some()) {
+        let mimic = joint.mimic.as_ref().expect("filtered");
+        let of = |n: &roxmltree::Node<'_, '_>| {
+            n.has_tag_name("joint") && n.attribute("name") == Some(&joint.name)
+        };
+        let written = document.descendants().find(of).expect("the joint");
+        let written = written
+            .descendants()
+            .find(|n| n.has_tag_name("mimic"))
+            .expect("its mimic");
+        assert_eq!(written.attribute("joint"), Some(mimic.joint.as_str()));
+        let number = |name: &str| {
+            let of = written
+                .children()
+                .find(|n| n.has_tag_name(name))
+                .expect("there");
+            of.text()
+                .expect("a number")
+                .parse::<f64>()
+                .expect("a number")
+        };
+        assert_eq!(
+            [number("multiplier"), number("offset"), number("reference")],
+            [mimic.multiplier, mimic.offset, 0.0]
+        );
+    }
+    file.masses_assumed = true;
+    for target in [Target::Urdf, Target::UrdfBest, Target::Mjcf, Target::Sdf] {
+        let text = export(&read(file.clone()), target, None, None)
+            .expect("written")
+            .text;
+        assert!(
+            !text.contains("<mass") && !text.contains(" mass="),
+            "{text}"
+        );
+        assert!(text.contains("none are written"), "{text}");
+    }
+}
+
 #[test]
 fn a_point_as_tool_is_a_link_of_what_is_written() {
     let mut r = rng(2);

@@ -150,14 +150,14 @@ fn corrected(named: Option<&str>) {
     let mut approach = Approach::new(&robot.model);
     let tool = robot.model.place(name).expect("a link or point");
     for (row, q) in cells[1..].iter().zip(&rows) {
-        approach.update(&robot.model, q).expect("finite");
-        if row[7] != "reached" {
-            continue;
-        }
         let command: Vec<f64> = row[1..7]
             .iter()
             .map(|c| c.parse::<f64>().expect("a number").to_radians())
             .collect();
+        approach.update(&robot.model, &command).expect("finite");
+        if row[7] != "reached" {
+            continue;
+        }
         robot.model.forward_nominal(q, &mut work).expect("poses");
         let wanted = robot.model.root_from(tool, &work).expect("a place");
         let under = Under {
@@ -349,4 +349,169 @@ fn poses_that_are_just_missed_are_approached_and_far_ones_are_refused() {
         (12, 0, 12),
         "{far:?}"
     );
+}
+
+/// What is stated of a command is what the model has of the sequence of commands, however small its steps: backlash takes the side from
+/// which the joint really comes.
+#[test]
+fn what_is_stated_holds_for_the_commands_one_after_the_other() {
+    let mut r = crate::common::rng(31);
+    let (mut reached, mut between) = (0, 0);
+    for seed in 0..6 {
+        let mut file = crate::common::robot(
+            &mut crate::common::rng(seed),
+            6,
+            false,
+            crate::common::Effects::All,
+        );
+        for effect in file.joints.iter_mut().flat_map(|j| &mut j.effects) {
+            // 0.2°: a play of millimeters.
+            if effect.kind == "backlash" {
+                effect.value = 3.5e-3;
+            }
+        }
+        let robot = Robot {
+            model: calib_model::Model::new(&file).expect("a model"),
+            file,
+        };
+        let mut q = crate::common::posture(&mut r, 6);
+        let mut text = (0..6)
+            .map(|i| format!("joint_{i}_deg"))
+            .collect::<Vec<_>>()
+            .join(",")
+            + "\n";
+        for _ in 0..60 {
+            let deg: Vec<String> = q.iter().map(|q| q.to_degrees().to_string()).collect();
+            text += &(deg.join(",") + "\n");
+            q.iter_mut()
+                .for_each(|q| *q += crate::common::within(&mut r, 6e-3));
+        }
+        let folder = tempfile::tempdir().expect("a folder");
+        let done =
+            correct(&robot, &table(&folder, &text), &CorrectOptions::default()).expect("corrected");
+        let cells = cells(&done.csv);
+        let column = |name: &str| cells[0].iter().position(|c| *c == name).expect("a column");
+        let (mut work, mut approach) = (robot.model.work(), Approach::new(&robot.model));
+        let tool = calib_model::Place::from(robot.model.last_link());
+        let wanted: Vec<Vec<f64>> = text.lines().skip(1).map(numbers).collect();
+        for (row, wanted) in cells[1..].iter().zip(&wanted) {
+            let command = numbers(&row[1..7].join(","));
+            approach.update(&robot.model, &command).expect("finite");
+            robot
+                .model
+                .forward_nominal(wanted, &mut work)
+                .expect("poses");
+            let wanted = robot.model.root_from(tool, &work).expect("a place");
+            let under = Under {
+                approach: approach.directions(),
+                held: None,
+                temperature_c: &[],
+            };
+            robot
+                .model
+                .forward(&command, &under, &mut work)
+                .expect("poses");
+            let there = robot.model.root_from(tool, &work).expect("a place");
+            let stated: f64 = row[column("after_mm")].parse().expect("a number");
+            let off = 1e3 * (wanted.t - there.t).norm();
+            assert!(
+                (stated - off).abs() < 2e-5,
+                "seed {seed}: {stated} mm stated, {off} mm"
+            );
+            between += usize::from(row[column("outcome")].starts_with("nearer"));
+        }
+        reached += done.reached;
+    }
+    println!("{reached} of 360 rows reached, {between} nearer only");
+    assert!(reached > 180, "{reached}");
+}
+
+/// Degrees of a row as radians.
+fn numbers(row: &str) -> Vec<f64> {
+    row.split(',')
+        .map(|c| c.parse::<f64>().expect("a number").to_radians())
+        .collect()
+}
+
+/// Positions without an orientation are reached where they alone are wanted, and otherwise refused; a name that is not the tool is no target.
+#[test]
+fn what_a_table_wants_of_the_tool_is_reached_or_said() {
+    let robot = arm();
+    let folder = tempfile::tempdir().expect("a folder");
+    let position_only = CorrectOptions {
+        position_only: true,
+        ..CorrectOptions::default()
+    };
+    let (mut work, last) = (robot.model.work(), robot.model.last_link());
+    let tool = robot.model.links()[last.index()].clone();
+    let q = [0.2, 0.4];
+    robot
+        .model
+        .forward(&q, &Under::default(), &mut work)
+        .expect("poses");
+    let at = robot
+        .model
+        .root_from(last.into(), &work)
+        .expect("a place")
+        .t;
+    let columns = format!("{tool}.x_m,{tool}.y_m,{tool}.z_m");
+    let place = format!("{},{},{}", at.x, at.y, at.z);
+    let with = format!("shoulder_deg,elbow_deg,{columns}\n8,20,{place}\n");
+    let without = format!("{columns}\n{place}\n");
+    for text in [&with, &without] {
+        let done = correct(&robot, &table(&folder, text), &position_only).expect("corrected");
+        let cells = cells(&done.csv);
+        let command = numbers(&cells[1][1..3].join(","));
+        let under = Under::default();
+        robot
+            .model
+            .forward(&command, &under, &mut work)
+            .expect("poses");
+        let there = robot
+            .model
+            .root_from(last.into(), &work)
+            .expect("a place")
+            .t;
+        assert!((there - at).norm() < 1e-6, "{}", done.csv);
+        // How it is turned is not known of these.
+        let end = cells[1].len();
+        assert_eq!(cells[1][end - 2..], ["", ""], "{}", done.csv);
+        let refused = correct(&robot, &table(&folder, text), &CorrectOptions::default());
+        let said = refused.expect_err("refused").to_string();
+        assert!(
+            said.contains("without its orientation") && said.contains("--position-only"),
+            "{said}"
+        );
+    }
+    // Of joint positions the nominal orientation is known, and its error stated.
+    let rows = table(&folder, "shoulder_deg,elbow_deg\n8,20\n");
+    let done = correct(&robot, &rows, &position_only).expect("corrected");
+    let row = &cells(&done.csv)[1];
+    assert!(
+        row[row.len() - 2].parse::<f64>().expect("a number") > 1e-6,
+        "{}",
+        done.csv
+    );
+
+    let other = "claw.x_m,claw.y_m,claw.z_m,claw.qx,claw.qy,claw.qz,claw.qw";
+    let pose = format!("{place},0,0,0,1");
+    let text = format!("shoulder_deg,elbow_deg,{other}\n8,20,{pose}\n");
+    let done =
+        correct(&robot, &table(&folder, &text), &CorrectOptions::default()).expect("corrected");
+    assert_eq!(done.unused, ["claw"]);
+    let alone = correct(
+        &robot,
+        &table(&folder, &format!("{other}\n{pose}\n")),
+        &CorrectOptions::default(),
+    );
+    let said = alone.expect_err("refused").to_string();
+    assert!(said.contains("`claw` is no link or point"), "{said}");
+    let link = &robot.model.links()[1];
+    let text = format!(
+        "shoulder_deg,elbow_deg,{}\n8,20,{pose}\n",
+        other.replace("claw", link)
+    );
+    let of_link = correct(&robot, &table(&folder, &text), &CorrectOptions::default());
+    let said = of_link.expect_err("refused").to_string();
+    assert!(said.contains(&format!("--tool {link}")), "{said}");
 }

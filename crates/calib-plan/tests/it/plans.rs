@@ -10,7 +10,7 @@ use rand::seq::index::sample;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-use crate::robots::{SCARA, SEVEN, SIX, Seen, five, known, robot, six};
+use crate::robots::{SCARA, SEVEN, SIX, Seen, five, folding, known, robot, six};
 
 /// Few candidates: the tests are about laws, not about the last percent.
 fn few(poses: usize) -> Options {
@@ -353,6 +353,36 @@ fn links_that_are_always_close_are_kept_from_touching() {
             }
         }
     }
+}
+
+/// Links with one joint between them are kept apart where their shapes end before it; where these overlap in most postures, it is said.
+#[test]
+fn links_next_to_each_other_are_not_folded_onto_each_other() {
+    let known = folding();
+    let options = few(16);
+    let prepared = prepare(&known, &options).unwrap_or_else(|e| panic!("{e}"));
+    let (scene, model) = (&prepared.feasible.scene, &known.robot.model);
+    let made = planned(&known, &options);
+    let least = |q: &[f64]| {
+        let placed = scene.placed(&model.forward_kinematics(q));
+        placed[0].distance(&placed[1])
+    };
+    assert_eq!(scene.capsules.len(), 2);
+    // Postures by chance fold it.
+    let joint = model.joint_id("j2").expect("a joint").index();
+    let mut folded = model.zero_positions();
+    folded[joint] = 3.05;
+    assert!(least(&folded) < 0.0);
+    for posture in &made.postures {
+        assert!(least(&posture.q) > 0.0, "{:?}", posture.q);
+    }
+    let known = six(Seen::Markers(4), "");
+    let made = planned(&known, &options);
+    let said = made.notes.iter().any(|note| match note {
+        Note::PairsNotCompared { pairs } => pairs.iter().any(|p| p[0] == "l1" && p[1] == "l2"),
+        _ => false,
+    });
+    assert!(said, "{:?}", made.notes);
 }
 
 /// No point of the robot moves further than the sum over the joints of their move times the way to the farthest point that they carry.
@@ -805,6 +835,21 @@ fn a_joint_whose_limits_leave_no_range_stands_still_and_the_plan_says_so() {
     assert!(
         error.contains("stand still") && error.contains("plan.hold"),
         "{error}"
+    );
+}
+
+/// Nobody knows which limits are meant where they are exchanged.
+#[test]
+fn a_joint_whose_limits_are_exchanged_stands_still_and_the_plan_says_so() {
+    let known = held(0.5, -0.5, "");
+    let plan = planned(&known, &few(8));
+    let second = known.robot.model.joint_id("j2").expect("a joint").index();
+    assert!(plan.postures.iter().all(|p| p.q[second] == 0.0));
+    let joints = vec!["j2".to_owned()];
+    assert!(
+        plan.notes.contains(&Note::NoRoom { joints }),
+        "{:?}",
+        plan.notes
     );
 }
 

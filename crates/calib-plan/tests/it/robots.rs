@@ -141,6 +141,24 @@ pub fn known(robot: RobotProfile) -> Known {
     Known::of(robot, Plugins::Refused).unwrap_or_else(|e| panic!("{e}"))
 }
 
+/// An arm whose elbow folds the forearm onto the upper arm: both have shapes that end before the elbow.
+pub fn folding() -> Known {
+    let joints = [
+        ("j1", "revolute", "0 0 0.3", "0 0 1", -2.0, 2.0),
+        ("j2", "revolute", "0.5 0 0", "0 1 0", -3.1, 3.1),
+        ("j3", "revolute", "0.5 0 0", "1 0 0", -2.0, 2.0),
+    ];
+    let shape = |link: &str, at: f64| {
+        format!(
+            "<link name=\"{link}\"><collision><origin xyz=\"{at} 0 0\" rpy=\"0 1.5707963 0\"/><geometry><cylinder radius=\"0.03\" length=\"0.3\"/></geometry></collision></link>"
+        )
+    };
+    let text = urdf(&joints, false)
+        .replace("<link name=\"l1\"></link>", &shape("l1", 0.2))
+        .replace("<link name=\"l2\"></link>", &shape("l2", 0.3));
+    known(of_text(text, &profile(3, Seen::Markers(4), "")))
+}
+
 pub fn six(seen: Seen, extra: &str) -> Known {
     known(robot(SIX, seen, true, extra))
 }

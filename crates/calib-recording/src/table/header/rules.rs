@@ -29,7 +29,8 @@ fn joint_of(column: &str) -> Option<&str> {
 }
 
 /// The robot's joints whose columns read as coordinates. Three coordinates of one thing may be a marker: they are joints where all three are called
-/// so, and coordinates without a name where other markers or bodies have one (`tracked`: in the column map), or where the robot alone wrote the table.
+/// so, and coordinates without a name where other markers or bodies have one (`tracked`: in the column map), where the robot alone wrote the table, or where
+/// others of its joints stand beside: a table that has some has all.
 fn joints_like_coordinates<'n>(
     names: &'n [String],
     mapped: &[bool],
@@ -41,21 +42,22 @@ fn joints_like_coordinates<'n>(
     if known.joints.is_empty() || meanings().any(|m| matches!(m, Meaning::Entity)) {
         return Vec::new();
     }
+    let is_known = |name: &str| known.joints.iter().any(|joint| joint == name);
     let others = tracked
         || known.of_robot
+        || meanings().any(|m| matches!(m, Meaning::Joint { name, .. } if is_known(name)))
         || meanings().any(|m| matches!(m, Meaning::Part { entity, .. } if !entity.is_empty()));
-    let is_joint = |name: &str| known.joints.iter().any(|joint| joint == name);
     let coordinates: Vec<&str> = own.filter_map(|(name, _)| joint_of(name)).collect();
     let of = |name: &str| {
         // `base_` of `base_x`, nothing of `x`.
         let entity = &name[..name.len() - 1];
         let same = |other: &&&str| other.len() == name.len() && other.starts_with(entity);
         let together: Vec<&&str> = coordinates.iter().filter(same).collect();
-        let all = together.iter().all(|name| is_joint(name));
+        let all = together.iter().all(|name| is_known(name));
         all && (together.len() < 3 || !entity.is_empty() || others)
     };
     let joints = coordinates.iter().copied();
-    joints.filter(|name| is_joint(name) && of(name)).collect()
+    joints.filter(|name| is_known(name) && of(name)).collect()
 }
 
 /// The column of one of these joints.
