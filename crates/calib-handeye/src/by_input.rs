@@ -16,6 +16,7 @@ use crate::{
     outcome::HandEye,
     problem::{HandEyeWeights, Weights},
     residuals::spread,
+    simulated::simulated,
     structure,
     unmodelled::unmodelled,
 };
@@ -36,7 +37,17 @@ pub(crate) fn certified(
     input: &Input<'_>,
     options: &Options,
 ) -> Result<Outcome<HandEye>, EstimatorError> {
-    run("handeye", input, options, |a, b, w| Ok(minimized(a, b, w)))
+    let solve = |a: &[_], b: &[_], w: Weights| Ok(minimized(a, b, w));
+    run("handeye", input, options, Uncertainty::OfCost, solve)
+}
+
+/// Where an estimator's covariance comes from.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Uncertainty {
+    /// (5): it minimizes the cost (1).
+    OfCost,
+    /// (9): it does not.
+    Simulated,
 }
 
 /// From poses of both sides and weights to both transforms.
@@ -55,6 +66,7 @@ pub(crate) fn run(
     estimator: &'static str,
     input: &Input<'_>,
     options: &Options,
+    uncertainty: Uncertainty,
     solve: impl Solve,
 ) -> Result<Outcome<HandEye>, EstimatorError> {
     options.check()?;
@@ -69,7 +81,15 @@ pub(crate) fn run(
     let solved = check(robot, measured, 3)
         .and_then(|()| check_axes(robot))
         .and_then(|()| check_axes(measured))
-        .and_then(|()| fitted(estimator, [robot, measured], w, &solve, options));
+        .and_then(|()| {
+            fitted(
+                estimator,
+                [robot, measured],
+                w,
+                (uncertainty, &solve),
+                options,
+            )
+        });
     match solved {
         Ok(mut found) => {
             let size = [spread(robot), spread(measured)];
@@ -84,17 +104,28 @@ fn fitted(
     estimator: &'static str,
     [robot, measured]: [&[Isometry3<f64>]; 2],
     w: Weights,
-    solve: &impl Solve,
+    (uncertainty, solve): (Uncertainty, &impl Solve),
     options: &Options,
 ) -> Result<HandEye, HandEyeError> {
-    let explanation = structure::explanation(robot, measured, w, |left, a, b| {
+    let solved = |a: &[Isometry3<f64>], b: &[Isometry3<f64>]| -> Result<HandEye, HandEyeError> {
+        let found = solve(a, b, w)?;
+        let judged = judged(estimator, [a, b], &found, w, options);
+        let covariance = match uncertainty {
+            Uncertainty::OfCost => judged.covariance,
+            Uncertainty::Simulated => simulated(a, &found, &judged.noise, |a, b| solve(a, b, w)),
+        };
+        Ok(HandEye {
+            covariance,
+            ..judged
+        })
+    };
+    let structure = structure::structure(robot, measured, w, |left, a, b| {
         plausible(left, [spread(a), spread(b)])
     });
-    if explanation.is_some() {
-        let found = solve(robot, measured, w)?;
+    if structure.explanation.is_some() {
         return Ok(HandEye {
-            explanation,
-            ..judged(estimator, [robot, measured], &found, w, options)
+            explanation: structure.explanation,
+            ..solved(robot, measured)?
         });
     }
     let keep = gross::kept(robot, measured, w);
@@ -102,8 +133,7 @@ fn fitted(
         keep.iter().map(|&i| poses[i]).collect()
     };
     let (a, b) = (chosen(robot), chosen(measured));
-    let found = solve(&a, &b, w)?;
-    let judged = judged(estimator, [&a, &b], &found, w, options);
+    let judged = solved(&a, &b)?;
     let beyond = unmodelled(
         [robot, measured],
         &keep,
@@ -115,6 +145,7 @@ fn fitted(
         rejected: (0..robot.len()).filter(|i| !keep.contains(i)).collect(),
         covariance: judged.covariance.map(|c| c + beyond.covariance),
         explanation: beyond.explanation,
+        open_direction: structure.open_direction,
         ..judged
     })
 }

@@ -9,7 +9,8 @@
 //! ```
 //!
 //! K. Daniilidis 1999, Int. J. Robotics Research 18(3), 286–298. A closed form without a start and without weights: a check of
-//! the least-squares estimate that shares no code with it.
+//! the least-squares estimate that shares no code with it. It is the less precise of the two where the motions are small, and has a bias: its covariance
+//! is that of its own answers to simulated noise (9).
 
 use calib_estimator::{EstimatorError, Input, InputKind, Options, Outcome};
 use calib_geometry::{decompose::symmetric_eigen_small, so3};
@@ -18,7 +19,7 @@ use nalgebra::{
 };
 
 use crate::{
-    by_input,
+    by_input::{self, Uncertainty},
     input::HandEyeError,
     minimum::Minimum,
     options::{COMMON, HandEyeInfo},
@@ -47,7 +48,13 @@ pub(crate) fn fit(
     input: &Input<'_>,
     options: &Options,
 ) -> Result<Outcome<HandEye>, EstimatorError> {
-    by_input::run("dual_quaternion", input, options, solve)
+    by_input::run(
+        "dual_quaternion",
+        input,
+        options,
+        Uncertainty::Simulated,
+        solve,
+    )
 }
 
 fn solve(a: &[Isometry3<f64>], b: &[Isometry3<f64>], _: Weights) -> Result<Minimum, HandEyeError> {

@@ -96,6 +96,7 @@ pub(crate) fn judged(
         used: a.len(),
         rejected: Vec::new(),
         explanation: None,
+        open_direction: None,
         verdict: Verdict::Ok,
         reason: contradicted(&position, &rotation),
         iterations,

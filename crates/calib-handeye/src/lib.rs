@@ -23,6 +23,8 @@
 //!
 //! Lengths of two scales, and a body or tracker that was moved between two rows, are fitted beside X and Z and named.
 //!
+//! Where the poses fit inverted as well, as any three do, the direction is said to be open.
+//!
 //! What this does not protect against: swapped tables, which leave no residual. X and Z come out as their inverses.
 //!
 //! ```
@@ -45,6 +47,7 @@
 mod by_input;
 mod certificate;
 mod correction;
+mod direction;
 mod dual_quaternion;
 mod gross;
 mod input;
@@ -57,11 +60,13 @@ mod problem;
 mod registry;
 mod relative;
 mod residuals;
+mod simulated;
 mod start;
 mod structure;
 mod unmodelled;
 
 pub use correction::{Correction, Explanation, Side};
+pub use direction::OpenDirection;
 pub use input::HandEyeError;
 pub use moving::solve_ax_zb;
 pub use nalgebra;

@@ -4,7 +4,7 @@ use calib_estimator::{Estimate, Verdict};
 use nalgebra::{Isometry3, SMatrix};
 use serde::Serialize;
 
-use crate::correction::Explanation;
+use crate::{correction::Explanation, direction::OpenDirection};
 
 /// Covariance of the right perturbations `[ω_x; v_x; ω_z; v_z]`, rad and m.
 pub type Covariance = SMatrix<f64, 12, 12>;
@@ -31,7 +31,7 @@ pub struct HandEye {
     pub x: Isometry3<f64>,
     /// Z.
     pub z: Isometry3<f64>,
-    /// Covariance from the noise below; `None` where the poses do not fix both transforms.
+    /// Mean square error from the noise below; `None` where the poses do not fix both transforms.
     pub covariance: Option<Covariance>,
     /// Noise that the covariance rests on.
     pub noise: HandEyeNoise,
@@ -51,6 +51,8 @@ pub struct HandEye {
     pub rejected: Vec<usize>,
     /// A structural mistake in the tables that explains the residuals.
     pub explanation: Option<Explanation>,
+    /// The direction of the measured poses is not observable; `None` where they do, where a mistake explains them, and where it was not asked.
+    pub open_direction: Option<OpenDirection>,
     /// [`Verdict::Ok`], or [`Verdict::Weak`] with the reason beside it.
     pub verdict: Verdict,
     /// Why the verdict is not `ok`, with numbers.

@@ -6,7 +6,7 @@
 //!
 //! s is the factor that the correction puts on the measured positions: without it, small numbers would fit everything. A correction is
 //! named where it lowers the geometric mean of both residuals by [`NAMED`] and what is left is plausible; others within
-//! [`ALIKE`] of it are named beside it.
+//! [`ALIKE`] of it are named beside it. That poses are inverted is named only where the poses show their direction ([`crate::direction`]).
 //!
 //! Exact equivalents: inverted poses of the one side and of the other (X and Z change places); millimeters on one side, and a factor of
 //! thousand on the other. Two swapped sides, and inverted poses on both, fit as well as none: X and Z come out as each other's inverse, or
@@ -17,6 +17,7 @@ use nalgebra::{Isometry3, Quaternion, Translation3, UnitQuaternion};
 
 use crate::{
     correction::{Correction, Explanation, Side},
+    direction::{self, EXACT, OpenDirection},
     judge,
     minimum::{Minimum, minimized},
     outcome::HandEye,
@@ -36,8 +37,6 @@ const SCORED: usize = 60;
 const SCORING: f64 = 0.75;
 /// Poses from which three quarters determine the fit.
 const ENOUGH: usize = 8;
-/// Residuals, m and rad, below which data count as exact.
-const EXACT: f64 = 1e-9;
 
 /// All single corrections.
 fn singles() -> Vec<Correction> {
@@ -144,6 +143,16 @@ struct Scored {
     tables: Tables,
     score: f64,
     residuals: Residuals,
+    /// Poses behind them.
+    rows: usize,
+}
+
+/// What the tables say of how they were written.
+pub(crate) struct Structure {
+    /// The corrections that explain the residuals, where some do.
+    pub explanation: Option<Explanation>,
+    /// The measured poses fit inverted as well.
+    pub open_direction: Option<OpenDirection>,
 }
 
 fn scored(corrections: Vec<Correction>, tables: Tables, w: Weights) -> Option<Scored> {
@@ -196,16 +205,17 @@ fn scored(corrections: Vec<Correction>, tables: Tables, w: Weights) -> Option<Sc
         tables,
         score,
         residuals,
+        rows: rows.len(),
     })
 }
 
-/// The corrections that explain the residuals, where some do. `plausible` judges what is left, and its tables.
-pub(crate) fn explanation(
+/// What explains the residuals, and whether the direction shows. `plausible` judges what is left, and its tables.
+pub(crate) fn structure(
     robot: &[Isometry3<f64>],
     measured: &[Isometry3<f64>],
     w: Weights,
     plausible: impl Fn(&Residuals, &[Isometry3<f64>], &[Isometry3<f64>]) -> bool,
-) -> Option<Explanation> {
+) -> Structure {
     let given = Tables {
         robot: robot.to_vec(),
         measured: measured.to_vec(),
@@ -234,9 +244,10 @@ pub fn explained_as_written(
         inverted: true,
     };
     let w = Weights::of(HandEyeWeights::default());
-    out.explanation = of(given, w, |left, a, b| {
+    let plausible = |left: &Residuals, a: &[Isometry3<f64>], b: &[Isometry3<f64>]| {
         judge::plausible(left, [spread(a), spread(b)])
-    });
+    };
+    out.explanation = of(given, w, plausible).explanation;
     if let Some(reason) = judge::structural(&out) {
         out.reason = Some(reason);
     }
@@ -247,8 +258,13 @@ fn of(
     given: Tables,
     w: Weights,
     plausible: impl Fn(&Residuals, &[Isometry3<f64>], &[Isometry3<f64>]) -> bool,
-) -> Option<Explanation> {
-    let none = scored(Vec::new(), given, w)?;
+) -> Structure {
+    let Some(none) = scored(Vec::new(), given, w) else {
+        return Structure {
+            explanation: None,
+            open_direction: None,
+        };
+    };
     let passes =
         |s: &Scored| plausible(&s.residuals, &s.tables.robot, &s.tables.measured_as_used());
     let added = |to: &Scored| -> Vec<Scored> {
@@ -265,18 +281,56 @@ fn of(
     };
     // Of those that leave something plausible the best, and those that are not distinguishable from it.
     let explaining = |mut found: Vec<Scored>| -> Vec<Scored> {
-        found.retain(|s| passes(s) && none.score - s.score >= NAMED.ln());
+        found.retain(|s| {
+            passes(s) && none.score - s.score >= NAMED.ln() && shows_its_direction(&none, s, w)
+        });
         let limit = found.first().map_or(0.0, |best| best.score + ALIKE.ln());
         found.retain(|s| s.score <= limit);
         found
     };
     let singles = added(&none);
+    let open_direction = open_direction(&none, singles.iter().filter(|s| passes(s)));
     let mut found = explaining(singles.clone());
     if found.is_empty() && !passes(&none) {
         let mut pairs: Vec<Scored> = singles.iter().take(BEAM).flat_map(added).collect();
         pairs.sort_by(|a, b| a.score.total_cmp(&b.score));
         found = explaining(pairs);
     }
+    Structure {
+        explanation: explanation(&none, found),
+        open_direction,
+    }
+}
+
+/// Whether the poses show that a correction inverts them rightly; `true` of one that does not invert them.
+fn shows_its_direction(none: &Scored, s: &Scored, w: Weights) -> bool {
+    let inverts = |c: &Correction| matches!(c, Correction::InvertedPoses(_));
+    if !s.corrections.iter().any(inverts) {
+        return true;
+    }
+    let others = s.corrections.iter().filter(|c| !inverts(c));
+    let others: Vec<Correction> = others.copied().collect();
+    let tables = others.iter().fold(none.tables.clone(), |t, c| c.apply(&t));
+    scored(others, tables, w)
+        .is_none_or(|other| direction::shown(&s.residuals, &other.residuals, s.rows))
+}
+
+/// What the measured poses leave inverted, unless those as used leave less by more than chance. `plausible`: single corrections.
+fn open_direction<'a>(
+    none: &Scored,
+    mut plausible: impl Iterator<Item = &'a Scored>,
+) -> Option<OpenDirection> {
+    let inverted =
+        plausible.find(|s| s.corrections == [Correction::InvertedPoses(Side::Measured)])?;
+    let open = OpenDirection {
+        as_used: none.residuals,
+        inverted: inverted.residuals,
+    };
+    (!direction::shown(&open.as_used, &open.inverted, none.rows)).then_some(open)
+}
+
+/// The corrections that were found, best first, each once.
+fn explanation(none: &Scored, found: Vec<Scored>) -> Option<Explanation> {
     let after = found.first()?.residuals;
     let mut candidates: Vec<Vec<Correction>> = Vec::new();
     for s in found {

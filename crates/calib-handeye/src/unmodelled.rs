@@ -18,6 +18,7 @@ use crate::{
     outcome::{Covariance, HandEye},
     problem::{Weights, linearize, moved},
     residuals::{Residuals, squares},
+    simulated::difference,
 };
 
 /// Ratio of residuals from which an effect can be an explanation, and not only a part of the uncertainty.
@@ -212,19 +213,6 @@ fn chosen(poses: &[Isometry3<f64>], rows: &[usize]) -> Vec<Isometry3<f64>> {
 fn sums(a: &[Isometry3<f64>], b: &[Isometry3<f64>], fit: &Minimum) -> [f64; 2] {
     let rows = a.iter().zip(b).map(|(a, b)| squares(a, b, &fit.x, &fit.z));
     rows.fold([0.0; 2], |sum, s| [sum[0] + s[0], sum[1] + s[1]])
-}
-
-/// Right perturbation `[ω_x; v_x; ω_z; v_z]` that leads from one fit to another.
-fn difference(from: &Minimum, to: &Minimum) -> SVector<f64, 12> {
-    let mut out = SVector::<f64, 12>::zeros();
-    for (k, (from, to)) in [(&from.x, &to.x), (&from.z, &to.z)].into_iter().enumerate() {
-        let d = from.inverse() * to;
-        out.fixed_rows_mut::<3>(6 * k)
-            .copy_from(&d.rotation.scaled_axis());
-        out.fixed_rows_mut::<3>(6 * k + 3)
-            .copy_from(&d.translation.vector);
-    }
-    out
 }
 
 /// A factor on the measured positions beside X and Z.
