@@ -10,7 +10,8 @@ use crate::TableRequest;
 use crate::answer::{Answer, answer, contradicted, coordinates, copied, doubt, freedom, matrix};
 use crate::comparison::{Found, Quantity};
 use crate::error::FitError;
-use crate::explained::{Judged, Unexplained, unexplained};
+use crate::explained::{self, Against, Judged};
+use crate::marker_noise::About;
 use crate::road::{self, Command, Data, Road, Wish};
 use crate::table::Table;
 
@@ -25,7 +26,9 @@ fn command() -> Command<AorEstimate> {
         quantity: Quantity::Direction("direction"),
         found: |e| Found {
             value: e.line.direction.into_inner(),
+            covariance: e.covariance.fixed_view::<3, 3>(0, 0).into_owned(),
             sigma: e.sigma_direction,
+            degrees_of_freedom: e.degrees_of_freedom,
         },
     }
 }
@@ -49,7 +52,7 @@ pub fn aor(request: &TableRequest) -> Result<Answer, FitError> {
         file: &table.file,
         data: Data::Table(&table, &tracks),
         options: &road::options(request, &table)?,
-        against: &|e| Some(against(request, &table, e)?.reason(WHAT)),
+        against: &|e| against(request, &table, e).reason(WHAT),
     };
     let wish = Wish {
         estimator: request.estimator.as_deref(),
@@ -79,13 +82,15 @@ fn rejected(table: &Table, e: &AorEstimate) -> Vec<u64> {
 }
 
 /// Residuals that are no noise about an axis.
-fn against(request: &TableRequest, table: &Table, e: &AorEstimate) -> Option<Unexplained> {
-    unexplained(request, table, e.rms, &rejected(table, e))
+fn against(request: &TableRequest, table: &Table, e: &AorEstimate) -> Against {
+    let about = About::Axis(e.line.point, e.line.direction);
+    explained::against(request, table, about, e.rms, &rejected(table, e))
 }
 
 fn aor_answer(request: &TableRequest, table: &Table, id: &str, e: &AorEstimate) -> Answer {
     let own = (e.verdict, e.reason.as_deref());
-    let judged = Judged::new(own, against(request, table, e), WHAT);
+    let against = against(request, table, e);
+    let judged = Judged::new(own, &against, WHAT);
     let observable = judged.is_observable();
     let rejected = rejected(table, e);
     let frame = axis_frame(request);
@@ -100,6 +105,7 @@ fn aor_answer(request: &TableRequest, table: &Table, id: &str, e: &AorEstimate) 
         "covariance": matrix(&e.covariance),
         "degrees_of_freedom": e.degrees_of_freedom,
         "contradicts": e.contradicts,
+        "marker_noise": against.noise.map(|n| n.value()),
         "rms_m": e.rms,
         "used": e.used,
         "rejected": rejected,
@@ -117,6 +123,7 @@ fn aor_answer(request: &TableRequest, table: &Table, id: &str, e: &AorEstimate) 
         value["copies"] = json!(table.copies);
     }
     text += &contradicted(e.contradicts.as_ref());
+    text += &against.note();
     let _ = writeln!(
         text,
         "  through {} m",

@@ -10,7 +10,8 @@ use crate::TableRequest;
 use crate::answer::{Answer, answer, contradicted, coordinates, copied, doubt, freedom, matrix};
 use crate::comparison::{Found, Quantity};
 use crate::error::FitError;
-use crate::explained::{Judged, Unexplained, unexplained};
+use crate::explained::{self, Against, Judged};
+use crate::marker_noise::About;
 use crate::road::{self, Command, Data, Road, Wish};
 use crate::table::Table;
 
@@ -28,7 +29,9 @@ fn command() -> Command<CorEstimate> {
         quantity: Quantity::Place("center_m"),
         found: |e| Found {
             value: e.center.coords,
+            covariance: e.covariance,
             sigma: e.covariance.trace().max(0.0).sqrt(),
+            degrees_of_freedom: e.degrees_of_freedom,
         },
     }
 }
@@ -52,7 +55,7 @@ pub fn cor(request: &TableRequest) -> Result<Answer, FitError> {
         file: &table.file,
         data: Data::Table(&table, &tracks),
         options: &road::options(request, &table)?,
-        against: &|e| Some(against(request, &table, e)?.reason(WHAT)),
+        against: &|e| against(request, &table, e).reason(WHAT),
     };
     let wish = Wish {
         estimator: request.estimator.as_deref(),
@@ -91,13 +94,15 @@ fn rejected(table: &Table, e: &CorEstimate) -> Vec<u64> {
 }
 
 /// Residuals that are no noise about a center.
-fn against(request: &TableRequest, table: &Table, e: &CorEstimate) -> Option<Unexplained> {
-    unexplained(request, table, e.rms, &rejected(table, e))
+fn against(request: &TableRequest, table: &Table, e: &CorEstimate) -> Against {
+    let about = About::Center(e.center);
+    explained::against(request, table, about, e.rms, &rejected(table, e))
 }
 
 fn cor_answer(request: &TableRequest, table: &Table, id: &str, e: &CorEstimate) -> Answer {
     let own = (e.verdict, e.reason.as_deref());
-    let judged = Judged::new(own, against(request, table, e), WHAT);
+    let against = against(request, table, e);
+    let judged = Judged::new(own, &against, WHAT);
     let observable = judged.is_observable();
     let rejected = rejected(table, e);
     let mut value = json!({
@@ -125,6 +130,7 @@ fn cor_answer(request: &TableRequest, table: &Table, id: &str, e: &CorEstimate) 
         value["copies"] = json!(table.copies);
     }
     text += &contradicted(e.noise.contradicts.as_ref());
+    text += &against.note();
     match &e.shape {
         Shape::Radii { radii, .. } => {
             value["radius_m"] = if radii.len() == 1 {
@@ -164,6 +170,7 @@ fn cor_answer(request: &TableRequest, table: &Table, id: &str, e: &CorEstimate) 
     }
     value["covariance"] = matrix(&e.covariance);
     value["contradicts"] = json!(e.noise.contradicts);
+    value["marker_noise"] = json!(against.noise.map(|n| n.value()));
     value["degrees_of_freedom"] = json!(e.degrees_of_freedom);
     value["rms_m"] = json!(e.rms);
     value["used"] = json!(e.used);

@@ -12,7 +12,8 @@
 //! rms > 3 σ   and   q > 0.2,   or   rms > 10 σ   and   q > 0.05                                          (2)
 //! ```
 //!
-//! and without one where q > 0.2. Random postures of an arm leave q of 0.25 to 0.7; a sweep of a joint with millimeters of backlash, below 0.05.
+//! and without one where q > 0.2. Where two or more markers of one body are known, their distances show the noise ([`crate::marker_noise`]), and
+//! residuals far beyond it are refused as well. Random postures of an arm leave q of 0.25 to 0.7; a sweep of a joint with millimeters of backlash, below 0.05.
 
 use nalgebra::{Matrix3, Point3, Vector3};
 
@@ -20,6 +21,7 @@ use calib_cor::Pose;
 use calib_estimator::Verdict;
 
 use crate::TableRequest;
+use crate::marker_noise::{About, LIMIT, MarkerNoise, marker_noise};
 use crate::table::Table;
 
 /// Residuals above this part of the motion are not noise about an axis or a center, unless so large a noise is stated.
@@ -46,18 +48,77 @@ pub(crate) struct Unexplained {
     stated: Option<f64>,
 }
 
-impl Unexplained {
-    /// The end of an answer's first line, before the estimate. `what`: axis or center.
-    pub fn head(&self, what: &str) -> String {
-        format!(
-            "{}\n  help: {}\n  the best fit nevertheless:",
-            self.reason(what),
-            self.remedy(what)
-        )
+/// What the data as a whole say of an axis or a center.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Against {
+    unexplained: Option<Unexplained>,
+    /// The noise that the markers' distances show.
+    pub noise: Option<MarkerNoise>,
+}
+
+impl Against {
+    /// Why there is no such axis or center. `what`: axis or center.
+    pub fn reason(&self, what: &str) -> Option<String> {
+        let refuted = self.noise.filter(|n| n.refuted);
+        let of_noise = || refuted.map(|n| n.reason(what));
+        self.unexplained.map(|u| u.reason(what)).or_else(of_noise)
     }
 
+    /// The end of an answer's first line, before the estimate; empty where nothing speaks against it.
+    fn head(&self, what: &str) -> String {
+        let Some(reason) = self.reason(what) else {
+            return String::new();
+        };
+        let remedy = match self.unexplained {
+            Some(u) => u.remedy(what),
+            None => format!(
+                "{} Axes that do not meet, backlash and a base that moves leave such residuals.",
+                recording(what)
+            ),
+        };
+        format!(" {reason}\n  help: {remedy}\n  the best fit nevertheless:")
+    }
+
+    /// The line on residuals that are more than noise and refute nothing.
+    pub fn note(&self) -> String {
+        let noted = self.noise.filter(|n| n.is_exceeded() && !n.refuted);
+        noted.map_or_else(String::new, |n| {
+            format!(
+                "  noise: the residuals are {:.1} times the noise of {:.3} mm that the distances of the markers show; sigma follows the residuals\n",
+                n.ratio,
+                n.sigma_m * 1e3
+            )
+        })
+    }
+}
+
+impl MarkerNoise {
+    fn reason(&self, what: &str) -> String {
+        format!(
+            "no single {what} explains the points: the residuals of {:.2} mm are {:.1} times the noise of {:.2} mm that the distances of the \
+             markers show (limit {:.1} times)",
+            self.residual_m * 1e3,
+            self.ratio,
+            self.sigma_m * 1e3,
+            self.of_sight.max(LIMIT)
+        )
+    }
+}
+
+fn recording(what: &str) -> &'static str {
+    match what {
+        "axis" => {
+            "Record a sweep of one joint with all others at rest, or give both sides of the joint with --parent and --child."
+        }
+        _ => {
+            "Record a motion about one center, or give both sides of the joint with --parent and --child."
+        }
+    }
+}
+
+impl Unexplained {
     /// `what`: axis or center.
-    pub fn reason(&self, what: &str) -> String {
+    fn reason(&self, what: &str) -> String {
         let mm = |x: f64| x * 1e3;
         let stated = self.stated.map_or_else(String::new, |s| {
             format!(", and {:.0} times the stated noise", self.rms / s)
@@ -73,14 +134,7 @@ impl Unexplained {
 
     /// What to do.
     fn remedy(&self, what: &str) -> String {
-        let recording = match what {
-            "axis" => {
-                "Record a sweep of one joint with all others at rest, or give both sides of the joint with --parent and --child."
-            }
-            _ => {
-                "Record a motion about one center, or give both sides of the joint with --parent and --child."
-            }
-        };
+        let recording = recording(what);
         match self.stated {
             None => format!(
                 "{recording} If the tracker is that noisy, state its noise with --sigma-mm."
@@ -101,12 +155,12 @@ pub(crate) struct Judged {
 
 impl Judged {
     /// `what`: axis or center.
-    pub fn new(own: (Verdict, Option<&str>), against: Option<Unexplained>, what: &str) -> Self {
-        match against {
-            Some(against) => Self {
+    pub fn new(own: (Verdict, Option<&str>), against: &Against, what: &str) -> Self {
+        match against.reason(what) {
+            Some(reason) => Self {
                 verdict: Verdict::Weak,
-                reason: Some(against.reason(what)),
-                head: format!(" {}", against.head(what)),
+                reason: Some(reason),
+                head: against.head(what),
             },
             None => Self {
                 verdict: own.0,
@@ -121,8 +175,27 @@ impl Judged {
     }
 }
 
-/// (2). `rejected`: numbers of the rows in the table's file.
-pub(crate) fn unexplained(
+/// What the data say of an estimate with residuals of `rms`, m. `rejected`: numbers of the rows in the table's file.
+pub(crate) fn against(
+    request: &TableRequest,
+    table: &Table,
+    about: About,
+    rms: f64,
+    rejected: &[u64],
+) -> Against {
+    // A stated noise may be one that all markers of a body share.
+    let is_stated = |n: &MarkerNoise| {
+        let stated = request.sigma_m.unwrap_or(0.0);
+        !table.covariances.is_empty() || n.residual_m <= STATED * stated
+    };
+    Against {
+        unexplained: unexplained(request, table, rms, rejected),
+        noise: marker_noise(table, rejected, about).filter(|n| !is_stated(n)),
+    }
+}
+
+/// (2).
+fn unexplained(
     request: &TableRequest,
     table: &Table,
     rms: f64,

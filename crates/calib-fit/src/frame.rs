@@ -11,7 +11,7 @@ use calib_recording::ReadOptions;
 use serde_json::json;
 
 use crate::answer::{Answer, answer, doubt, matrix, pose_text, pose_value};
-use crate::comparison::{Found, Quantity};
+use crate::comparison::{Found, Quantity, in_parent};
 use crate::error::FitError;
 use crate::road::{Command, Data, Road, Wish};
 use crate::table::{it_has, no_table};
@@ -25,7 +25,12 @@ fn command() -> Command<FrameEstimate> {
         quantity: Quantity::Place("translation_m"),
         found: |f| Found {
             value: f.body_from_joint.translation.vector,
+            covariance: in_parent(
+                &f.body_from_joint,
+                &f.covariance.fixed_view::<3, 3>(3, 3).into_owned(),
+            ),
             sigma: f.covariance.diagonal().rows(3, 3).sum().max(0.0).sqrt(),
+            degrees_of_freedom: None,
         },
     }
 }

@@ -5,15 +5,15 @@ use std::f64::consts::FRAC_PI_2;
 use std::fmt::Write as _;
 
 use calib_estimator::{Input, Kind, Options, Verdict};
-use calib_handeye::{Correction, HandEye, explained_as_written};
+use calib_handeye::{Correction, HandEye, Residuals, explained_as_written};
 use calib_recording::{BodyColumns, ColumnMap, Problem, ReadOptions};
 use calib_urdf::rpy::{rotation_from_rpy, rpy_from_rotation};
-use nalgebra::{Isometry3, Translation3, Vector3};
+use nalgebra::{Isometry3, Matrix3, Translation3, Vector3};
 use serde_json::{Value, json};
 
 use crate::HandEyeRequest;
 use crate::answer::{Answer, answer, copied, doubt, freedom, matrix, pose_text, pose_value};
-use crate::comparison::{Found, Quantity};
+use crate::comparison::{Found, Quantity, in_parent};
 use crate::error::FitError;
 use crate::measured::Measured;
 use crate::road::{Command, Data, Road, Wish};
@@ -27,6 +27,10 @@ fn command() -> Command<HandEye> {
         quantity: Quantity::Place("x_translation_m"),
         found: |e| Found {
             value: e.x.translation.vector,
+            covariance: e.covariance.map_or(Matrix3::zeros(), |c| {
+                in_parent(&e.x, &c.fixed_view::<3, 3>(3, 3).into_owned())
+            }),
+            degrees_of_freedom: e.noise.degrees_of_freedom,
             sigma: e.sigmas().map_or(f64::INFINITY, |s| {
                 (s[3] * s[3] + s[4] * s[4] + s[5] * s[5]).sqrt()
             }),
@@ -181,6 +185,7 @@ fn handeye_answer(
         "verdict": e.verdict.as_str(),
         "reason": e.reason,
         "explanation": e.explanation,
+        "open_direction": e.open_direction,
         "x": pose_value(&e.x),
         "z": pose_value(&e.z),
         "x_urdf": observable.then(|| origin_value(&e.x)),
@@ -204,6 +209,7 @@ fn handeye_answer(
     if let Some(remedy) = remedy(request, e, rows) {
         let _ = writeln!(text, "  {remedy}");
     }
+    text += &direction(e);
     for (name, pose, at) in [
         ("X, flange_from_body:", &e.x, 0),
         ("Z, base_from_tracker:", &e.z, 6),
@@ -254,6 +260,24 @@ fn handeye_answer(
         let _ = writeln!(text, "  gross errors in rows {rejected:?}");
     }
     answer(text, &value, observable)
+}
+
+/// What the answer takes for granted where the poses do not show their direction.
+fn direction(e: &HandEye) -> String {
+    let Some(open) = &e.open_direction else {
+        return String::new();
+    };
+    let shown = |r: &Residuals| {
+        let (mm, deg) = (r.rms_translation * 1e3, r.rms_rotation.to_degrees());
+        format!("{mm:.3} mm and {deg:.3}°")
+    };
+    format!(
+        "  warning: the direction of the measured poses is not observable from these {} poses: the residuals are {} as used, {} inverted\n  \
+         help: Add poses rotated about other axes, or make sure that the direction is right: with the wrong one, X and Z are wrong.\n",
+        e.used,
+        shown(&open.as_used),
+        shown(&open.inverted)
+    )
 }
 
 /// What to do about a mistake of the tables.

@@ -11,6 +11,7 @@ mod error;
 mod explained;
 mod frame;
 mod handeye;
+mod marker_noise;
 mod measured;
 mod noise;
 mod plugin;
