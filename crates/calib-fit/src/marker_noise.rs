@@ -9,7 +9,7 @@
 //! ```
 //!
 //! A tracker may know points k times worse along its sight w than across; the distances then show less of it than the residuals, by (2) at most.
-//! Residuals are more than noise where P(F(N − p, ν) > s²/(κσ)²) < 10⁻³ says so. They are those of no center or axis where they exceed [`LIMIT`] σ as
+//! Residuals are more than noise where P(F(N − p, ν) > s²/(κσ)²) < 10⁻³ says so. They refute a center or an axis where they exceed [`LIMIT`] σ as
 //! well: errors that the markers of a body share, and a little backlash, leave some.
 
 use calib_checks::rigid_body::{Distances, computed_below};
