@@ -228,8 +228,9 @@ fn without_axis(
         };
         if chance > options.significance {
             let reason = format!(
-                "the body turns by {:.3}° rms, no more than its orientation noise of {:.3}° (chance {chance:.1e})",
+                "the body turns by {:.3}° rms, which {} poses do not distinguish from its orientation noise of {:.3}° (chance {chance:.1e})",
                 (sums.lambda.sum() / 2.0 / sums.total).sqrt().to_degrees(),
+                sums.n,
                 sigma_r.to_degrees()
             );
             return Some(Outcome::none(

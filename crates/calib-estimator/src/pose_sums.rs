@@ -207,9 +207,10 @@ impl PoseSums {
             return Some((
                 Verdict::NoRotation,
                 format!(
-                    "the body turns by {:.3}° rms, no more than the {source} orientation noise of {:.3}° \
+                    "the body turns by {:.3}° rms, which {} poses do not distinguish from the {source} orientation noise of {:.3}° \
                      (chance {chance:.1e})",
                     (self.lambda.sum() / 2.0 / self.total).sqrt().to_degrees(),
+                    self.n,
                     sigma_r.to_degrees()
                 ),
             ));
@@ -220,11 +221,12 @@ impl PoseSums {
             return Some((
                 Verdict::SingleAxis,
                 format!(
-                    "all rotations share one axis within their noise: the spread about other axes is \
-                     {:.2} times the {source} orientation noise of {:.3}° (chance {chance:.1e}, accepted \
+                    "no second axis shows: the spread about other axes than the first is {:.2} times the {source} orientation \
+                     noise of {:.3}°, which {} poses do not distinguish from noise (chance {chance:.1e}, accepted \
                      below {:.0e}); every point of the axis fits equally well",
                     (second / dof).sqrt(),
                     sigma_r.to_degrees(),
+                    self.n,
                     significance
                 ),
             ));

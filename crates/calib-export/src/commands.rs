@@ -4,11 +4,10 @@
 //! and is repeated with those of the commands that it found. What is stated of a row is evaluated with these.
 
 use calib_model::{
-    Approach, Correction, Model, ModelError, Options, Outcome, Place, Pose, Scope, Under, Work,
+    Aim, Approach, Correction, Model, ModelError, Options, Outcome, Place, Pose, Scope, Under, Work,
 };
 use nalgebra::Matrix6;
 
-use crate::correct::CorrectOptions;
 use crate::starts::{LEVER, Starts};
 
 /// Searches of a row; a joint whose direction still changes then is between its two sides.
@@ -17,6 +16,33 @@ const SEARCHES: usize = 4;
 const NEAR: (f64, f64) = (5e-3, 0.0175);
 /// A command whose tool is as near is there, m: a thousandth of what any tracker resolves.
 const THERE: f64 = 1e-7;
+
+/// What is corrected.
+#[derive(Debug, Clone, Default)]
+pub struct CorrectOptions {
+    /// The link or point that is to be right; `None`: the last link.
+    pub tool: Option<String>,
+    /// Only its position.
+    pub position_only: bool,
+    /// Bound on the change of a joint, rad and m; `None`: that of [`Options::default`].
+    pub largest_rad: Option<f64>,
+    /// The same of sliding joints.
+    pub largest_m: Option<f64>,
+}
+
+impl CorrectOptions {
+    fn within(&self, default: Options) -> Options {
+        Options {
+            aim: match self.position_only {
+                true => Aim::Position,
+                false => default.aim,
+            },
+            largest_rad: self.largest_rad.unwrap_or(default.largest_rad),
+            largest_m: self.largest_m.unwrap_or(default.largest_m),
+            ..default
+        }
+    }
+}
 
 /// What a row became.
 #[derive(Debug, Clone)]

@@ -4,30 +4,17 @@ use std::path::Path;
 
 use calib_finding::cell;
 use calib_model::file::ModelBody;
-use calib_model::{Aim, ModelError, Options, Outcome, Place, Pose};
+use calib_model::{ModelError, Outcome, Place, Pose};
 use calib_recording::joint_column;
 use nalgebra::{Isometry3, Point3};
 
-use crate::commands::{Command, Commands};
+use crate::commands::{Command, Commands, CorrectOptions};
 use crate::error::ExportError;
 use crate::read::Robot;
 use crate::table::{Csv, NOTES, Program, program};
 
 /// Rows at which it is asked how well the model knows where the tool stands.
 const KNOWN_AT: usize = 200;
-
-/// What is corrected.
-#[derive(Debug, Clone, Default)]
-pub struct CorrectOptions {
-    /// The link or point that is to be right; `None`: the last link.
-    pub tool: Option<String>,
-    /// Only its position.
-    pub position_only: bool,
-    /// Bound on the change of a joint, rad and m; `None`: that of [`Options::default`].
-    pub largest_rad: Option<f64>,
-    /// The same of sliding joints.
-    pub largest_m: Option<f64>,
-}
 
 /// A corrected program.
 #[derive(Debug, Clone)]
@@ -203,20 +190,6 @@ fn wanted(
         oriented: true,
         unused: names().filter(|n| !known(n)).cloned().collect(),
     })
-}
-
-impl CorrectOptions {
-    pub(crate) fn within(&self, default: Options) -> Options {
-        Options {
-            aim: match self.position_only {
-                true => Aim::Position,
-                false => default.aim,
-            },
-            largest_rad: self.largest_rad.unwrap_or(default.largest_rad),
-            largest_m: self.largest_m.unwrap_or(default.largest_m),
-            ..default
-        }
-    }
 }
 
 impl Corrected {

@@ -33,7 +33,8 @@ mod ur;
 mod xml;
 mod yaml;
 
-pub use correct::{CorrectOptions, Corrected, correct};
+pub use commands::CorrectOptions;
+pub use correct::{Corrected, correct};
 pub use cost::Cost;
 pub use error::ExportError;
 pub use export::{Exported, export};

@@ -88,6 +88,12 @@ pub enum Problem {
     /// A header but nothing below it.
     #[error("no data rows below the header")]
     NoRows,
+    /// Rows of empty cells only.
+    #[error("all {rows} rows below the header are empty: nothing but separators")]
+    EmptyRows {
+        /// How many.
+        rows: usize,
+    },
     /// Two columns of the same name.
     #[error("column `{name}` occurs twice (columns {first} and {second})")]
     DuplicateColumn {

@@ -15,6 +15,9 @@ impl Problem {
             Problem::Empty | Problem::NoRows => {
                 "export the recording again; the copy or download was probably cut off"
             }
+            Problem::EmptyRows { .. } => {
+                "record again: nothing was seen, or the values stand in other columns than the header has"
+            }
             Problem::TooLarge { .. } => "cut the recording into parts, or raise the limit",
             Problem::NotUtf8 { .. } => "save the file as UTF-8",
             Problem::NotUtf16 => "copy the file again, or save it as UTF-8",

@@ -365,7 +365,7 @@ fn what_is_stated_holds_for_the_commands_one_after_the_other() {
             crate::common::Effects::All,
         );
         for effect in file.joints.iter_mut().flat_map(|j| &mut j.effects) {
-            // 0.2°: a play of millimeters.
+            // 0.2°: millimeters at the tool.
             if effect.kind == "backlash" {
                 effect.value = 3.5e-3;
             }

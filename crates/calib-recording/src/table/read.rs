@@ -57,6 +57,10 @@ pub(crate) fn read_table(
         };
         body.line(number, line, whole)?;
     }
+    if body.rows.is_empty() && !body.blank.is_empty() {
+        let rows = body.blank.len();
+        return Err((At::Line(lines.number()), Problem::EmptyRows { rows }));
+    }
     if body.rows.is_empty() {
         return Err((At::Line(lines.number()), Problem::NoRows));
     }

@@ -15,12 +15,16 @@
 //! In `6d` lines a lost body is absent; so is everything in a frame without the line. Angles are ignored, the matrix
 //! has six decimals and is made orthonormal. Unknown lines are skipped, as the protocol asks.
 
+mod fields;
+
+use fields::Fields;
+
 use super::common::{body_stream, head_text, pose, rotation, unexpected};
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
 use crate::growth::push;
 use crate::model::{BodyStream, MarkerSample, MarkerStream, Recording, Timeline};
-use crate::text::{Lines, Number, number};
+use crate::text::Lines;
 use crate::units::LengthUnit;
 use calib_finding::{Fact, Finding, Subject, catalog};
 use nalgebra::{Isometry3, Matrix3, Point3};
@@ -90,56 +94,6 @@ fn read(input: &mut dyn Input, _options: &ReadOptions) -> Placed<Recording> {
         return Err((At::Line(lines.number()), Problem::NoRows));
     }
     log.finish(lines.number())
-}
-
-/// A line's fields, one after the other.
-struct Fields<'a> {
-    line: u64,
-    rest: &'a str,
-}
-
-impl<'a> Fields<'a> {
-    fn word(&mut self) -> Option<&'a str> {
-        let rest = self.rest.trim_start();
-        let end = rest
-            .find(|c: char| c.is_ascii_whitespace() || c == '[')
-            .unwrap_or(rest.len());
-        let (word, rest) = rest.split_at(end);
-        self.rest = rest;
-        (!word.is_empty()).then_some(word)
-    }
-
-    fn value(&mut self, what: &str) -> Placed<f64> {
-        let word = self.word().unwrap_or("");
-        match number(word) {
-            Number::Value(value) => Ok(value),
-            _ => unexpected(self.line, word, what),
-        }
-    }
-
-    /// A whole number, ≥ 0.
-    fn count(&mut self, what: &str) -> Placed<u64> {
-        let word = self.word().unwrap_or("");
-        word.parse().or_else(|_| unexpected(self.line, word, what))
-    }
-
-    /// The numbers of the next `[…]`.
-    fn block(&mut self, what: &str) -> Placed<Vec<f64>> {
-        let rest = self.rest.trim_start();
-        let inner = rest.strip_prefix('[').and_then(|rest| rest.split_once(']'));
-        let Some((inner, rest)) = inner else {
-            return unexpected(self.line, rest, &format!("`[{what}]`"));
-        };
-        self.rest = rest;
-        let mut numbers = Vec::new();
-        for word in inner.split_ascii_whitespace() {
-            match number(word) {
-                Number::Value(value) => numbers.push(value),
-                _ => return unexpected(self.line, word, &format!("a number of `[{what}]`")),
-            }
-        }
-        Ok(numbers)
-    }
 }
 
 impl Log {
