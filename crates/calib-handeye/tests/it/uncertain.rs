@@ -80,7 +80,7 @@ fn inverted(poses: &[Isometry3<f64>]) -> Vec<Isometry3<f64>> {
 #[test]
 fn three_poses_do_not_show_their_direction() {
     for design in [Design(3, 0.8, 3e-4, 9e-4), Design(3, 0.8, 1e-3, 5e-3)] {
-        for seed in 0..of(300, 60) {
+        for seed in 0..of(100, 30) {
             let c = case(seed, design);
             let right = fit("handeye", &c.robot, &c.measured);
             let wrong = fit("handeye", &c.robot, &inverted(&c.measured));
@@ -107,7 +107,7 @@ fn a_direction_is_named_where_the_poses_show_it() {
     ];
     for design in designs {
         let (mut open, mut named) = (0, 0);
-        let seeds = of(300, 20);
+        let seeds = of(100, 20);
         for seed in 0..seeds {
             let c = case(seed, design);
             let right = fit("handeye", &c.robot, &c.measured);
@@ -150,7 +150,7 @@ fn regions_of_every_estimator_cover() {
         Design(6, 0.5, 1e-3, 5.2e-3),
         Design(12, 0.8, 3e-3, 3.5e-4),
     ];
-    let trials = of(400, 20);
+    let trials = of(60, 20);
     for info in estimators() {
         for design in designs {
             let (mut of_x, mut of_all) = (0_u32, 0_u32);
