@@ -210,6 +210,20 @@ fn estimation_uses_the_trusted_decompositions() {
     assert!(found.is_empty(), "{}", found.join("\n"));
 }
 
+/// Archives and programs come in by chance; all that belongs here can be read.
+#[test]
+fn every_file_is_text() {
+    let is_text = |path: &Path| String::from_utf8(fs::read(path).unwrap_or_default()).is_ok();
+    let others: Vec<String> = files()
+        .into_iter()
+        // What a fuzzer found stays on the machine.
+        .filter(|(name, _)| !name.starts_with("fuzz/"))
+        .filter(|(_, path)| !is_text(path))
+        .map(|(name, _)| name)
+        .collect();
+    assert!(others.is_empty(), "no text: {}", others.join(", "));
+}
+
 #[test]
 fn no_snapshot_waits_for_review() {
     let waiting: Vec<String> = files()

@@ -7,7 +7,6 @@ use calib_model::{Model, Place, Pose};
 use calib_recording::{
     ColumnMap, Filled, JointUnit, Poses, Problem, ReadOptions, WHOLE_ROBOT, read_path,
 };
-
 use nalgebra::Point3;
 
 use crate::error::ExportError;
@@ -212,10 +211,9 @@ fn fits(file: &str, poses: &Poses, model: &Model) -> Result<(), ExportError> {
             .place(name)
             .is_some_and(|p| !matches!(p, Place::Body(_)))
     };
-    let mut names = poses.bodies.keys().chain(poses.markers.keys());
-    if !some && !names.any(|name| tool(name)) {
-        let mut names = poses.bodies.keys().chain(poses.markers.keys());
-        let what = match names.next() {
+    let names = || poses.bodies.keys().chain(poses.markers.keys());
+    if !some && !names().any(|name| tool(name)) {
+        let what = match names().next() {
             None => "has no column of a joint".to_owned(),
             Some(name) => {
                 format!("has no column of a joint, and `{name}` is no link or point of this robot")

@@ -51,7 +51,7 @@ pub struct HandEye {
     pub rejected: Vec<usize>,
     /// A structural mistake in the tables that explains the residuals.
     pub explanation: Option<Explanation>,
-    /// The direction of the measured poses is not observable; `None` where they do, where a mistake explains them, and where it was not asked.
+    /// The direction of the measured poses is not observable; `None` where it is, where a mistake explains them, and where it was not asked.
     pub open_direction: Option<OpenDirection>,
     /// [`Verdict::Ok`], or [`Verdict::Weak`] with the reason beside it.
     pub verdict: Verdict,

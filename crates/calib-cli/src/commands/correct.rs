@@ -80,7 +80,7 @@ pub fn run(console: &Console, options: &Correct) -> Result<ExitCode, CliError> {
     })
 }
 
-/// Columns that the program may have been meant by.
+/// Positions in the table that may have been meant as targets.
 fn unused(done: &Corrected) -> Option<String> {
     let first = done.unused.first()?;
     let more = match done.unused.len() - 1 {

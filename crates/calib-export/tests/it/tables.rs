@@ -160,16 +160,7 @@ fn corrected(named: Option<&str>) {
         }
         robot.model.forward_nominal(q, &mut work).expect("poses");
         let wanted = robot.model.root_from(tool, &work).expect("a place");
-        let under = Under {
-            approach: approach.directions(),
-            held: None,
-            temperature_c: &[],
-        };
-        robot
-            .model
-            .forward(&command, &under, &mut work)
-            .expect("poses");
-        let there = robot.model.root_from(tool, &work).expect("a place");
+        let there = after(&robot, &approach, &command, tool);
         assert!(
             (wanted.t - there.t).norm() < 2e-9,
             "{}",
@@ -402,16 +393,7 @@ fn what_is_stated_holds_for_the_commands_one_after_the_other() {
                 .forward_nominal(wanted, &mut work)
                 .expect("poses");
             let wanted = robot.model.root_from(tool, &work).expect("a place");
-            let under = Under {
-                approach: approach.directions(),
-                held: None,
-                temperature_c: &[],
-            };
-            robot
-                .model
-                .forward(&command, &under, &mut work)
-                .expect("poses");
-            let there = robot.model.root_from(tool, &work).expect("a place");
+            let there = after(&robot, &approach, &command, tool);
             let stated: f64 = row[column("after_mm")].parse().expect("a number");
             let off = 1e3 * (wanted.t - there.t).norm();
             assert!(
@@ -424,6 +406,26 @@ fn what_is_stated_holds_for_the_commands_one_after_the_other() {
     }
     println!("{reached} of 360 rows reached, {between} nearer only");
     assert!(reached > 180, "{reached}");
+}
+
+/// Where the tool stands at a command to which the joints came so.
+fn after(
+    robot: &Robot,
+    approach: &Approach,
+    command: &[f64],
+    tool: calib_model::Place,
+) -> calib_model::Pose {
+    let under = Under {
+        approach: approach.directions(),
+        held: None,
+        temperature_c: &[],
+    };
+    let mut work = robot.model.work();
+    robot
+        .model
+        .forward(command, &under, &mut work)
+        .expect("poses");
+    robot.model.root_from(tool, &work).expect("a place")
 }
 
 /// Degrees of a row as radians.

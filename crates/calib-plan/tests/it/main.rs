@@ -9,3 +9,4 @@ mod reached;
 mod robots;
 mod shape;
 mod speed;
+mod touching;
