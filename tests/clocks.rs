@@ -278,3 +278,61 @@ fn late_joint_values_are_named_and_the_remedy_works() {
         }
     }
 }
+
+/// Three slides: nothing turns, and only places tell the offset.
+#[test]
+fn streams_of_a_robot_that_turns_nothing_are_brought_together() {
+    for body in [Body::Four, Body::Pose] {
+        let slides = |text: String| {
+            let text = text.replace("revolute", "prismatic");
+            text.replace("\"-3\" upper=\"3\"", "\"-1\" upper=\"1\"")
+        };
+        // The first three joints of the arm, the others fixed.
+        let urdf = urdf();
+        let (first, last) = urdf.split_once("<link name=\"l4\"/>").expect("a fourth");
+        let last = last.replace("revolute", "fixed");
+        let urdf = format!("{}<link name=\"l4\"/>{last}", slides(first.to_owned()));
+        let profile = |fitted: &str, held_out: &str| {
+            let text = profile(body, fitted, held_out);
+            let text = text.replace("joint_offset_deg: 0.3, ", "");
+            text.replace(
+                "[bodies, tracker, joint_offsets, joint_axes]",
+                "[bodies, tracker]",
+            )
+            .replace("axis_mm: 1, axis_deg: 0.2", "axis_mm: 0, axis_deg: 0")
+        };
+        let dir = Scratch::new()
+            .file("arm.urdf", urdf.clone())
+            .file("arm.yaml", profile("", ""));
+        let robot = load_robot(&dir.path("arm.yaml")).expect("a robot");
+        let ranges = robot.model.independent_joints().map(|id| (id, (-0.8, 0.8)));
+        let plan = StreamPlan {
+            motion: Motion::Continuous,
+            ranges: ranges.collect(),
+            bodies: vec!["tip".to_owned()],
+            duration: 60.0,
+            tracker_hz: RATE,
+            robot_hz: RATE,
+            offset: OFFSET,
+            drift: DRIFT,
+        };
+        let all = simulate_streams(&robot.profile, &robot.model, &plan, 1).expect("a section");
+        let log = |name: &str| {
+            format!(", robot_log: {{file: {name}_joints.csv}}, timing: {{poses: continuous}}")
+        };
+        let dir = Scratch::new()
+            .file("arm.urdf", urdf)
+            .file("arm.yaml", profile(&log("poses"), &log("check")))
+            .file("poses.csv", text(&part(&all.tracker, 0.0, 40.0 + OFFSET)))
+            .file("check.csv", text(&part(&all.tracker, 40.0 + OFFSET, 1e9)))
+            .file("poses_joints.csv", text(&part(&all.robot, 0.0, 40.0)))
+            .file("check_joints.csv", text(&part(&all.robot, 40.0, 1e9)));
+        let (code, report) = report(&dir);
+        assert_eq!(code, 0, "{body:?}: {}", report["reasons"]);
+        for (recording, middle) in [("poses", 20.0), ("check", 50.0)] {
+            let (offset, sigma) = clock(&report, recording);
+            let error = offset - OFFSET - DRIFT * (middle - 30.0);
+            assert!(error.abs() < 5e-4, "{body:?}: {error} ± {sigma}");
+        }
+    }
+}

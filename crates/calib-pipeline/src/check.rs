@@ -28,6 +28,7 @@ use crate::prepare::inputs::Inputs;
 use crate::prepare::load::load_recordings;
 use crate::prepare::named;
 use crate::prepare::relabel::relabel;
+use crate::prepare::repeats;
 use crate::prepare::robot::load_robot;
 use crate::prepare::tracks::{BodyTrack, body_tracks};
 use crate::verify::causes::causes;
@@ -82,6 +83,7 @@ pub fn check(profile: &Path, plugins: Plugins) -> Result<DataChecks, PipelineErr
         Err(_) if wrong => {}
         Err(error) => return Err(error),
     }
+    findings.extend(repeats::found(&inputs));
     findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
     Ok(DataChecks {
         robot: inputs.robot.profile.robot.clone(),

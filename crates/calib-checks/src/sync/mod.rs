@@ -11,6 +11,7 @@
 mod holds;
 mod offset;
 mod point;
+mod rigid;
 
 pub use holds::{Hold, HoldSettings, StaticPoses, holds, static_poses};
 pub use offset::{ClockMap, OffsetOutcome, OffsetSettings, RotationTrack, clock_offset};

@@ -15,6 +15,7 @@ use std::ops::Range;
 use nalgebra::{Isometry3, Matrix2, Point3, SMatrix, SVector, Vector2, Vector3};
 
 use super::offset::{BLOCKS, ClockMap, OF_BLOCKS, OffsetOutcome, OffsetSettings};
+use super::rigid::{Rigid, as_rigid};
 use crate::statistics::median;
 
 /// Positions at times of one clock; lost samples are left out.
@@ -33,8 +34,8 @@ pub struct LinkTrack {
 }
 
 /// Numbers of x in equation (1).
-const SIZE: usize = 13;
-type Regressors = SVector<f64, SIZE>;
+pub(super) const SIZE: usize = 13;
+pub(super) type Regressors = SVector<f64, SIZE>;
 
 /// A marker must move by this, m rms: ten times what nominal kinematics leave unexplained.
 const MIN_MOTION: f64 = 0.03;
@@ -51,6 +52,8 @@ const MAX_LEFT: f64 = 0.1;
 const CLEARLY: f64 = 4.0;
 /// Minima closer than this, s, are one.
 const APART: f64 = 0.5;
+/// σ of an offset, s, from which it is asked with rigid R₀, m and t₀ too.
+const UNSURE: f64 = 0.01;
 /// Longest gap, in units of the median step, over which poses are interpolated.
 const MAX_GAP: f64 = 5.0;
 /// Half of the time of difference quotients, s.
@@ -122,6 +125,30 @@ impl LinkTrack {
     }
 }
 
+/// What A of equation (1) may be.
+#[derive(Clone, Copy)]
+enum How {
+    /// Any numbers.
+    Free,
+    /// Those of rigid R₀, m and t₀.
+    Rigid,
+}
+
+/// What takes out of a column what changes of A explain.
+enum Explains {
+    Free(Projection),
+    Rigid(Rigid),
+}
+
+impl Explains {
+    fn left(&self, column: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+        match self {
+            Self::Free(free) => free.left(column),
+            Self::Rigid(rigid) => rigid.left(column),
+        }
+    }
+}
+
 /// Least squares of columns in x.
 struct Projection {
     rows: Vec<Regressors>,
@@ -163,12 +190,21 @@ impl Projection {
     }
 }
 
+/// x and the place of the marker at the times that both have in common at an offset.
+fn common(
+    seen: &[(f64, Point3<f64>)],
+    link: &LinkTrack,
+    offset: f64,
+) -> (Vec<Regressors>, Vec<Vector3<f64>>) {
+    let common = seen.iter();
+    common
+        .filter_map(|(t, p)| Some((link.at(t - offset)?, p.coords)))
+        .unzip()
+}
+
 /// Share of the squared motion of `seen` that (1) leaves at an offset, for its degrees of freedom.
 fn left_at(seen: &[(f64, Point3<f64>)], link: &LinkTrack, offset: f64) -> Option<f64> {
-    let common = seen
-        .iter()
-        .filter_map(|(t, p)| Some((link.at(t - offset)?, p.coords)));
-    let (x, y): (Vec<Regressors>, Vec<Vector3<f64>>) = common.unzip();
+    let (x, y) = common(seen, link, offset);
     let n = y.len();
     if n < MIN_SAMPLES || 2 * n < seen.len() {
         return None;
@@ -179,7 +215,7 @@ fn left_at(seen: &[(f64, Point3<f64>)], link: &LinkTrack, offset: f64) -> Option
     (total > 0.0).then(|| left / total * (n - 1) as f64 / (n - SIZE) as f64)
 }
 
-fn about_mean(y: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+pub(super) fn about_mean(y: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
     let mean = y.iter().sum::<Vector3<f64>>() / y.len().max(1) as f64;
     y.iter().map(|y| y - mean).collect()
 }
@@ -221,7 +257,7 @@ pub fn clock_offset_of_point(
         .map(|w| w[1])
         .collect();
     minima.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let Some(&(offset, left)) = minima.first() else {
+    let Some(&(_, left)) = minima.first() else {
         return OffsetOutcome::TooShort;
     };
     let correlation = |left: f64| (1.0 - left).max(0.0).sqrt();
@@ -231,16 +267,20 @@ pub fn clock_offset_of_point(
             needed: correlation(MAX_LEFT),
         };
     }
-    let mut others = minima.iter().filter(|m| (m.0 - offset).abs() > APART);
-    let second = others.next().map_or(1.0, |m| m.1);
-    let ratio = correlation(second) / correlation(left);
-    if let Some(other) = minima
-        .iter()
-        .find(|m| (m.0 - offset).abs() > APART && m.1 < CLEARLY * left)
-    {
+    let minima = apart(minima);
+    let asked = minima.iter().filter(|m| m.1 < CLEARLY * left).count();
+    // A slow motion is like another one up to A; as a rigid motion it is not.
+    let minima = match asked {
+        1 => minima,
+        _ => as_rigid(&minima[..asked], |offset| common(&seen, b, offset)),
+    };
+    let (offset, left) = minima[0];
+    let second = minima.get(1);
+    let ratio = second.map_or(0.0, |m| correlation(m.1) / correlation(left));
+    if let Some(second) = second.filter(|m| asked > 1 && m.1 < CLEARLY * left) {
         return OffsetOutcome::Ambiguous {
             first: offset,
-            second: other.0,
+            second: second.0,
             ratio,
         };
     }
@@ -253,7 +293,32 @@ pub fn clock_offset_of_point(
         correlation: correlation(left),
         second: ratio,
     };
-    refine(&a.thinned(REFINED), b, start)
+    let seen = a.thinned(REFINED);
+    // Free numbers explain errors of the kinematics, and the more of a slow motion's offset.
+    let free = refine(&seen, b, start, How::Free);
+    match free {
+        OffsetOutcome::Found(map) if map.offset_sigma < UNSURE => free,
+        _ => match (refine(&seen, b, start, How::Rigid), &free) {
+            (OffsetOutcome::Found(rigid), OffsetOutcome::Found(map))
+                if map.offset_sigma <= rigid.offset_sigma =>
+            {
+                free
+            }
+            (found @ OffsetOutcome::Found(_), _) => found,
+            _ => free,
+        },
+    }
+}
+
+/// Minima, best first, without those that are closer than [`APART`] to a better one.
+fn apart(minima: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    let mut kept: Vec<(f64, f64)> = Vec::new();
+    for minimum in minima {
+        if kept.iter().all(|known| (known.0 - minimum.0).abs() > APART) {
+            kept.push(minimum);
+        }
+    }
+    kept
 }
 
 /// Samples in common at one map, in order of time.
@@ -280,15 +345,28 @@ impl Common {
     }
 
     /// A step of Gauss-Newton in (δ, ρ) with A eliminated, without the samples of `out`.
-    fn change(&self, out: &Range<usize>) -> Option<Vector2<f64>> {
+    fn change(&self, out: &Range<usize>, how: How) -> Option<Vector2<f64>> {
         let kept: Vec<usize> = (0..self.y.len()).filter(|i| !out.contains(i)).collect();
         if kept.len() < MIN_SAMPLES {
             return None;
         }
         let y: Vec<Vector3<f64>> = kept.iter().map(|&i| self.y[i]).collect();
-        let projection = Projection::new(kept.iter().map(|&i| self.x[i]).collect())?;
-        let a = projection.fit(&y).transpose();
-        let left = projection.left(&y);
+        let x: Vec<Regressors> = kept.iter().map(|&i| self.x[i]).collect();
+        let (a, projection) = match how {
+            How::Free => {
+                let projection = Projection::new(x)?;
+                let a = projection.fit(&y).transpose();
+                (a, Explains::Free(projection))
+            }
+            How::Rigid => {
+                let rigid = Rigid::new(&x, &y)?;
+                (rigid.a(), Explains::Rigid(rigid))
+            }
+        };
+        let left: Vec<Vector3<f64>> = match &projection {
+            Explains::Free(free) => free.left(&y),
+            Explains::Rigid(rigid) => rigid.residuals(&y),
+        };
         // y − A x(τ): ∂/∂δ = A x', ∂/∂ρ = A x' (τ − τ̄), of which x explains a part.
         let rates = || kept.iter().map(|&i| self.rates[i]);
         let of_offset: Vec<Vector3<f64>> = rates().map(|(rate, _)| a * rate).collect();
@@ -306,10 +384,10 @@ impl Common {
     }
 
     /// Variances of offset and drift by the answers without one block of time each, A being found again.
-    fn spread(&self) -> Option<Vector2<f64>> {
+    fn spread(&self, how: How) -> Option<Vector2<f64>> {
         let n = self.y.len();
         let edge = |k: usize| k * n / BLOCKS;
-        let answers = (0..BLOCKS).map(|k| self.change(&(edge(k)..edge(k + 1))));
+        let answers = (0..BLOCKS).map(|k| self.change(&(edge(k)..edge(k + 1)), how));
         let answers: Vec<Vector2<f64>> = answers.collect::<Option<_>>()?;
         let squares: Vector2<f64> = answers.iter().map(|c| c.component_mul(c)).sum();
         Some(squares * OF_BLOCKS)
@@ -317,16 +395,21 @@ impl Common {
 }
 
 /// Gauss-Newton in (δ, ρ).
-fn refine(seen: &[(f64, Point3<f64>)], link: &LinkTrack, mut map: ClockMap) -> OffsetOutcome {
+fn refine(
+    seen: &[(f64, Point3<f64>)],
+    link: &LinkTrack,
+    mut map: ClockMap,
+    how: How,
+) -> OffsetOutcome {
     for _ in 0..MAX_STEPS {
         let common = Common::of(seen, link, &map);
-        let Some(change) = common.change(&(0..0)) else {
+        let Some(change) = common.change(&(0..0), how) else {
             return OffsetOutcome::TooShort;
         };
         map.offset += change[0];
         map.drift += change[1];
         if change[0].abs() < 1e-7 && change[1].abs() < 1e-9 {
-            let Some(spread) = common.spread() else {
+            let Some(spread) = common.spread(how) else {
                 return OffsetOutcome::TooShort;
             };
             map.offset_sigma = spread[0].sqrt();

@@ -113,9 +113,7 @@ fn seen_and_nominal(
     seed: u64,
     held: bool,
 ) -> (PointTrack, LinkTrack, RotationTrack, RotationTrack) {
-    let mut rng = ChaCha8Rng::seed_from_u64(seed + 2000);
-    let world = Isometry3::new(Vector3::new(1.2, -0.4, 0.9), Vector3::new(0.3, -1.0, 2.0));
-    let when = |t: f64| {
+    seen_and_nominal_at(seed, &|t: f64| {
         let (hold, part) = ((t / 3.0).floor(), (t / 3.0).fract());
         let way = ((part - 0.5) / 0.5).clamp(0.0, 1.0);
         if held {
@@ -123,7 +121,16 @@ fn seen_and_nominal(
         } else {
             t
         }
-    };
+    })
+}
+
+/// The same where the arm is at `when(t)` of its motion at `t`.
+fn seen_and_nominal_at(
+    seed: u64,
+    when: &dyn Fn(f64) -> f64,
+) -> (PointTrack, LinkTrack, RotationTrack, RotationTrack) {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed + 2000);
+    let world = Isometry3::new(Vector3::new(1.2, -0.4, 0.9), Vector3::new(0.3, -1.0, 2.0));
     let times: Vec<f64> = (0..3000).map(|i| f64::from(i) * 0.02).collect();
     let tracker = |t: f64| t + POINT_OFFSET + POINT_DRIFT * (t - 29.99);
     let seen: Vec<(f64, Point3<f64>, UnitQuaternion<f64>)> = times
@@ -195,6 +202,32 @@ fn a_stated_sigma_covers_the_truth_on_a_robot_with_nominal_errors() {
         "{covered} of {all}"
     );
     assert!(squares > 0.2 * f64::from(all), "σ is much too large");
+}
+
+/// A third of the speed, and offsets up to half of the recording: thirteen free numbers explain such a motion at any of them.
+#[test]
+fn a_slow_motion_is_like_another_one_only_where_it_may_bend() {
+    let settings = OffsetSettings {
+        max_offset: 40.0,
+        ..OffsetSettings::default()
+    };
+    for seed in 0..12 {
+        let (point, link, _, _) = seen_and_nominal_at(seed, &|t| 0.3 * t);
+        let outcome = clock_offset_of_point(&point, &link, &settings);
+        let OffsetOutcome::Found(map) = outcome else {
+            panic!("seed {seed}: {outcome:?}")
+        };
+        let [offset, _] = in_sigma(&map);
+        println!(
+            "seed {seed}: {offset:.2} σ of {:.2} ms",
+            map.offset_sigma * 1e3
+        );
+        assert!((map.offset - POINT_OFFSET).abs() < 0.1, "{seed}: {map:?}");
+        assert!(
+            offset.abs() < 5.0 && map.offset_sigma < 0.05,
+            "{seed}: {map:?}"
+        );
+    }
 }
 
 #[test]

@@ -21,32 +21,18 @@ const COPIED: f64 = 1e-6;
 
 /// Merges the frames of every posture; a finding for each recording that had some.
 pub fn merge(inputs: &mut Inputs) -> Vec<Finding> {
+    let found = repeated(inputs);
     let mut findings = Vec::new();
-    let mut moved = Vec::new();
-    let scales = scales(inputs);
-    for loaded in inputs.recordings.values_mut() {
-        if loaded.alignment.is_some() || !loaded.shapes.is_empty() {
-            continue;
+    for Repeated {
+        recording,
+        groups,
+        finding,
+    } in found
+    {
+        if let Some(loaded) = inputs.recordings.get_mut(&recording) {
+            merge_rows(loaded, &groups);
         }
-        let groups = postures(loaded, &scales);
-        if groups.len() == loaded.q.len() {
-            continue;
-        }
-        let poses = groups.iter().filter(|group| shows(loaded, group[0]));
-        let poses = poses.count();
-        findings.push(
-            Finding::new(
-                catalog::FRAMES_MERGED,
-                Subject::recording(loaded.name.clone()),
-            )
-            .with("rows", Fact::count(loaded.q.len()))
-            .with("poses", Fact::count(poses))
-            .with_some("copies", copies(loaded, &groups)),
-        );
-        merge_rows(loaded, &groups);
-        moved.push((loaded.name.clone(), groups));
-    }
-    for (recording, groups) in moved {
+        findings.push(finding);
         let place = |row: usize| groups.iter().position(|g| g.contains(&row)).unwrap_or(0);
         let excluded = inputs.excluded.iter_mut();
         for out in excluded.filter(|out| out.recording == recording) {
@@ -61,6 +47,45 @@ pub fn merge(inputs: &mut Inputs) -> Vec<Finding> {
             .collect();
     }
     findings
+}
+
+/// What [`merge`] would find, of recordings that stay as they are.
+pub fn found(inputs: &Inputs) -> Vec<Finding> {
+    let found = repeated(inputs).into_iter();
+    found.map(|repeated| repeated.finding).collect()
+}
+
+/// A recording with several frames of a posture.
+struct Repeated {
+    recording: String,
+    /// Its rows, together where they are of one posture.
+    groups: Vec<Vec<usize>>,
+    finding: Finding,
+}
+
+/// The recordings that have several frames of a posture.
+fn repeated(inputs: &Inputs) -> Vec<Repeated> {
+    let scales = scales(inputs);
+    let of = |(name, loaded): (&String, &Loaded)| {
+        if loaded.alignment.is_some() || !loaded.shapes.is_empty() {
+            return None;
+        }
+        let groups = postures(loaded, &scales);
+        if groups.len() == loaded.q.len() {
+            return None;
+        }
+        let poses = groups.iter().filter(|group| shows(loaded, group[0]));
+        let finding = Finding::new(catalog::FRAMES_MERGED, Subject::recording(name.clone()))
+            .with("rows", Fact::count(loaded.q.len()))
+            .with("poses", Fact::count(poses.count()))
+            .with_some("copies", copies(loaded, &groups));
+        Some(Repeated {
+            recording: name.clone(),
+            groups,
+            finding,
+        })
+    };
+    inputs.recordings.iter().filter_map(of).collect()
 }
 
 /// Successive rows in which every joint stays within the jitter, where the bodies stood still meanwhile. A row that shows nothing is one of its own,

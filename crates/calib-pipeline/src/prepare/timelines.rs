@@ -175,8 +175,13 @@ pub(crate) fn tracker_table(
     Ok(poses)
 }
 
-/// Equation (1) from the body that tells it best, by its angular speed; where none has an orientation, from single markers. Else
-/// why not.
+/// σ of an offset by angular speed, s, from which places are asked too: a fit starts well from it.
+const SURE: f64 = 5e-3;
+/// Two offsets agree within so many σ of their difference.
+const AGREE: f64 = 4.0;
+
+/// Equation (1) from the body that tells it best, by its angular speed; where none tells it well, as of a robot that hardly turns, by the places
+/// of markers and bodies. Else why not.
 pub(crate) fn estimate(
     robot: &RobotProfile,
     spec: &RecordingSpec,
@@ -189,23 +194,43 @@ pub(crate) fn estimate(
         ..OffsetSettings::default()
     };
     let mut turning = Vec::new();
-    let mut moving = Vec::new();
+    let mut links = Vec::new();
     for (name, body) in &robot.profile.bodies {
         let link = link_poses(robot, spec, joints, body.link);
-        let link = || link.iter().copied();
         if let Some(seen) = orientation(table, name, &body.kind) {
-            let link = RotationTrack::new(link().map(|(t, pose)| (t, pose.map(|p| p.rotation))));
+            let poses = link.iter().copied();
+            let link = RotationTrack::new(poses.map(|(t, pose)| (t, pose.map(|p| p.rotation))));
             turning.push((name.clone(), clock_offset(&seen, &link, &settings)));
-        } else {
-            let link = LinkTrack::new(link());
-            for seen in points(table, &body.kind) {
-                let outcome = clock_offset_of_point(&seen, &link, &settings);
-                moving.push((name.clone(), outcome));
-            }
+        }
+        links.push((name, &body.kind, link));
+    }
+    let told = (!turning.is_empty()).then(|| best(turning));
+    let sure = |(_, map): &(String, ClockMap)| map.offset_sigma < SURE;
+    if let Some(Ok(found)) = told.as_ref().filter(|told| told.as_ref().is_ok_and(sure)) {
+        return Ok(found.clone());
+    }
+    let mut moving = Vec::new();
+    for (name, kind, link) in links {
+        let link = LinkTrack::new(link);
+        for seen in points(table, name, kind) {
+            let outcome = clock_offset_of_point(&seen, &link, &settings);
+            moving.push((name.clone(), outcome));
         }
     }
-    let outcomes = if turning.is_empty() { moving } else { turning };
-    best(outcomes).map_err(|why| {
+    let moving = best(moving);
+    if let Some(Ok(of_turn)) = told {
+        let agrees = |map: &ClockMap| {
+            let sigma = map.offset_sigma.hypot(of_turn.1.offset_sigma);
+            map.offset_sigma < of_turn.1.offset_sigma
+                && (map.offset - of_turn.1.offset).abs() < AGREE * sigma
+        };
+        return Ok(moving
+            .ok()
+            .filter(|(_, map)| agrees(map))
+            .unwrap_or(of_turn));
+    }
+    moving.map_err(|of_points| {
+        let why = told.and_then(Result::err).unwrap_or(of_points);
         let short = why.facts.get("kind").and_then(Fact::word) == Some("too_short");
         let apart = short.then(|| apart(table, joints, timing.max_offset));
         apart.flatten().map_or(why, Box::new)
@@ -328,16 +353,26 @@ fn blank_hung(track: &mut [(f64, Option<Isometry3<f64>>)]) {
     }
 }
 
-/// The markers of a body over the tracker's time.
-fn points(table: &Poses, kind: &BodyKind) -> Vec<PointTrack> {
-    let (BodyKind::Markers { names, .. }, Some(times)) = (kind, &table.t) else {
+/// The places that tell the motion of a body over the tracker's time: those of its markers, or of its origin.
+fn points(table: &Poses, name: &str, kind: &BodyKind) -> Vec<PointTrack> {
+    let Some(times) = &table.t else {
         return Vec::new();
     };
-    let track = |name: &String| {
-        let seen = table.markers.get(name)?.iter().copied();
-        Some(PointTrack::new(times.iter().copied().zip(seen)))
+    let track = |seen: &mut dyn Iterator<Item = Option<Point3<f64>>>| {
+        PointTrack::new(times.iter().copied().zip(seen))
     };
-    names.iter().filter_map(track).collect()
+    match kind {
+        BodyKind::Pose => {
+            let origin = |pose: &Isometry3<f64>| Point3::from(pose.translation.vector);
+            let seen = table.bodies.get(name).into_iter();
+            seen.map(|of| track(&mut of.iter().map(|pose| pose.as_ref().map(origin))))
+                .collect()
+        }
+        BodyKind::Markers { names, .. } => {
+            let seen = names.iter().filter_map(|name| table.markers.get(name));
+            seen.map(|of| track(&mut of.iter().copied())).collect()
+        }
+    }
 }
 
 /// A body's orientation over the tracker's time, where it has one.
