@@ -327,6 +327,7 @@ pub fn planned_recording(usage: Usage) -> RecordingSpec {
         columns: None,
         robot_log: None,
         timing: None,
+        place: 0,
     }
 }
 

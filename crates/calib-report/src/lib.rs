@@ -99,7 +99,7 @@ pub use svg::picture;
 pub use verdict::{
     Agreement, Compared, Effect, FoundNoise, Goodness, ImplausibleChange, Improvement, Judgment,
     Orientation, Part, Predicted, Prediction, Reason, ReasonId, RejectedPart, Share, SingleJoint,
-    Solver, Untested, UntestedKind, UrdfAlone, Validation, VerdictFacts, judge,
+    Solver, UnseenBody, Untested, UntestedKind, UrdfAlone, Validation, VerdictFacts, judge,
 };
 pub use verification::{AngleStats, ErrorStats, LoopClosure, LoopGroup, Stats, Verification};
 pub use view3d::View3d;

@@ -72,6 +72,7 @@ pub(crate) fn facts(
             held_out: motions.held_out_one_by_one && !left_out && held_out.is_some(),
         },
         not_verified: motions.still.clone(),
+        unseen_bodies: motions.unseen.clone(),
         goodness: e.fit.map(|fit| goodness(e, fit)),
         prediction: e
             .fit

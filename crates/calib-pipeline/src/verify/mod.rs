@@ -28,6 +28,7 @@ mod seen;
 mod suspects;
 pub(crate) mod tracker_noise;
 mod tried;
+mod unseen;
 mod zeros;
 
 use std::collections::BTreeMap;

@@ -1,10 +1,12 @@
 //! Where the joints were: what the fitted recordings move, and what the held-out poses can verify of it.
 
 use calib_profile::Usage;
+use calib_report::UnseenBody;
 use calib_urdf::JointId;
 
 use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::slides::scales;
+use crate::verify::unseen::Shown;
 
 /// Smallest motion of a joint that counts, rad, or m where the robot is large: 2°, 35 mm.
 const MOVED: f64 = 0.035;
@@ -26,6 +28,8 @@ pub(crate) struct Motions {
     pub(crate) held_out_one_by_one: bool,
     /// Joints that the fitted recordings move and the held-out poses hardly do.
     pub(crate) still: Vec<String>,
+    /// Bodies that the fitted recordings show and no held-out pose does.
+    pub(crate) unseen: Vec<UnseenBody>,
     /// Held-out postures.
     pub(crate) postures: usize,
     /// Those with a joint beyond the fitted range.
@@ -64,9 +68,24 @@ pub(crate) fn motions(inputs: &Inputs, joint_sigma: f64) -> Motions {
             at < low - counts(*joint) || at > high + counts(*joint)
         })
     };
+    let shown = Shown::new(inputs);
+    let unseen = match held_out_rows.is_empty() {
+        true => Vec::new(),
+        false => shown.unseen(inputs, &joints),
+    };
+    // Where no body that follows it is seen at all, that is what is said of a joint.
+    let is_named = |joint: &JointId| {
+        let mut unseen = unseen.iter();
+        unseen.any(|body| body.joints.contains(&model.joint(*joint).name))
+    };
     let still = moved.iter().filter(|(joint, (low, high))| {
-        let verified = range(&held_out, *joint).map_or(0.0, |(l, h)| h - l);
-        verified < VERIFIED * (high - low)
+        let rows = held_out.iter().flat_map(|loaded| {
+            let rows = loaded.q.iter().enumerate();
+            rows.filter(|(row, _)| shown.follows(loaded, *row, *joint))
+                .filter_map(|(_, q)| q.as_ref())
+        });
+        let verified = range_of(rows, *joint).map_or(0.0, |(l, h)| h - l);
+        verified < VERIFIED * (high - low) && !is_named(joint)
     });
     let still = still.map(|(joint, _)| model.joint(*joint).name.clone());
     Motions {
@@ -77,6 +96,7 @@ pub(crate) fn motions(inputs: &Inputs, joint_sigma: f64) -> Motions {
         } else {
             still.collect()
         },
+        unseen,
         postures: held_out_rows.len(),
         outside: held_out_rows.iter().filter(beyond).count(),
         repeated: repeated(
@@ -95,7 +115,11 @@ fn rows<'a>(recordings: &[&'a Loaded]) -> Vec<&'a Vec<f64>> {
 
 /// Smallest and largest position of a joint, where any is known.
 fn range(recordings: &[&Loaded], joint: JointId) -> Option<(f64, f64)> {
-    let positions = rows(recordings).into_iter().map(|q| q[joint.index()]);
+    range_of(rows(recordings).into_iter(), joint)
+}
+
+fn range_of<'a>(rows: impl Iterator<Item = &'a Vec<f64>>, joint: JointId) -> Option<(f64, f64)> {
+    let positions = rows.map(|q| q[joint.index()]);
     positions
         .filter(|q| q.is_finite())
         .fold(None, |range, q| match range {

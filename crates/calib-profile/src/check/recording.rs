@@ -77,6 +77,7 @@ impl Checker<'_> {
                 columns: log.columns.clone(),
             }),
             timing,
+            place: raw.place.0,
         }
     }
 

@@ -28,6 +28,8 @@ pub struct RecordingSpec {
     pub robot_log: Option<RobotLog>,
     /// How rows with a time become poses; `None`: every row is a pose.
     pub timing: Option<Timing>,
+    /// Where it stands among the recordings of the profile, from 0: taken for the order in which they were made.
+    pub place: usize,
 }
 
 /// The robot's own log of its joints.

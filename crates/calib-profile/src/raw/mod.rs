@@ -54,7 +54,8 @@ pub struct RawProfile {
     /// live tracker sends.
     #[serde(default)]
     pub names: BTreeMap<String, String>,
-    /// The recordings, by name.
+    /// The recordings, by name, in the order in which they were made.
+    #[serde(deserialize_with = "recording::in_their_order")]
     pub recordings: BTreeMap<String, RawRecording>,
     /// Plugins to load, by name; found beside the profile in `plugins/` or on the search path.
     #[serde(default)]

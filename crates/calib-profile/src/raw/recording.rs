@@ -2,7 +2,8 @@
 
 use super::RawValue;
 use schemars::JsonSchema;
-use serde::{Deserialize, Serialize};
+use serde::de::{MapAccess, Visitor};
+use serde::{Deserialize, Deserializer, Serialize};
 use std::collections::BTreeMap;
 
 /// What a recording is for.
@@ -15,6 +16,42 @@ pub enum RawUse {
     Static,
     /// Held out: never used to fit, only to verify.
     Validation,
+}
+
+/// Place of an entry among those of its map, from 0. It is no part of what the entry says: entries are equal whatever their places.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Place(pub usize);
+
+impl PartialEq for Place {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
+
+/// The recordings by name, each with its place in the text: that is taken for the order in which they were made.
+pub(super) fn in_their_order<'de, D: Deserializer<'de>>(
+    from: D,
+) -> Result<BTreeMap<String, RawRecording>, D::Error> {
+    struct Entries;
+
+    impl<'de> Visitor<'de> for Entries {
+        type Value = BTreeMap<String, RawRecording>;
+
+        fn expecting(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+            f.write_str("a map")
+        }
+
+        fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<Self::Value, A::Error> {
+            let mut out = BTreeMap::new();
+            while let Some((name, mut recording)) = map.next_entry::<String, RawRecording>()? {
+                recording.place = Place(out.len());
+                out.insert(name, recording);
+            }
+            Ok(out)
+        }
+    }
+
+    from.deserialize_map(Entries)
 }
 
 /// One recording.
@@ -51,6 +88,9 @@ pub struct RawRecording {
     /// a pose, and tracker and joints must share their rows.
     #[serde(default)]
     pub timing: Option<RawTiming>,
+    /// Where it stands among the recordings.
+    #[serde(skip)]
+    pub place: Place,
 }
 
 /// The robot's own log of its joints.

@@ -41,12 +41,25 @@ pub struct Facts {
     pub single_joint: SingleJoint,
     /// Joints that the fit moved and the held-out poses hardly move.
     pub not_verified: Vec<String>,
+    /// Bodies that the fit used and no held-out pose shows.
+    pub unseen_bodies: Vec<UnseenBody>,
     /// Goodness of fit; `None` with the closed forms.
     pub goodness: Option<Goodness>,
     /// How far predictions can be off; `None` with the closed forms, or where nothing was measured at the robot's end.
     pub prediction: Option<Prediction>,
     /// Held-out errors against what is stated of them; `None` without.
     pub agreement: Option<Agreement>,
+}
+
+/// A body that the fit used and no held-out pose shows.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct UnseenBody {
+    /// Its name.
+    pub name: String,
+    /// The joints that nothing else verifies.
+    pub joints: Vec<String>,
+    /// Its mount is the one after a change, in place of which the one before may be verified.
+    pub remounted: bool,
 }
 
 /// An rms position error over the joint ranges, m.

@@ -13,8 +13,8 @@ mod rules;
 pub use compare::{Improvement, Quantity as Compared};
 pub use facts::{
     Agreement, Change as ImplausibleChange, Facts as VerdictFacts, FoundNoise, Goodness,
-    Orientation, Part, Predicted, Prediction, RejectedPart, Share, SingleJoint, Solver, Untested,
-    UntestedKind, UrdfAlone, Validation,
+    Orientation, Part, Predicted, Prediction, RejectedPart, Share, SingleJoint, Solver, UnseenBody,
+    Untested, UntestedKind, UrdfAlone, Validation,
 };
 pub use reason::{Effect, Reason, ReasonId};
 pub use rules::{Judgment, RULES, judge};

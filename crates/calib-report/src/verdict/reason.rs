@@ -102,6 +102,8 @@ reasons! {
     OrientationNotMeasured = "orientation-not-measured": Warns,
     /// One joint at a time moved.
     SingleJointData = "single-joint-data": Warns | LeavesOpen,
+    /// No held-out pose shows a body that the fit used.
+    BodyNotVerified = "body-not-verified": Warns | LeavesOpen,
     /// Joints that the fit used hardly move in the held-out poses.
     JointsNotVerified = "joints-not-verified": Warns,
     /// What the URDF predicts without the effects that it cannot hold.

@@ -13,7 +13,7 @@ use crate::verdict::{Effect, Reason};
 pub type Rule = fn(&Facts) -> Vec<Reason>;
 
 /// Every rule. What each asks for stands in the book, by the ids of its reasons.
-pub const RULES: [Rule; 21] = [
+pub const RULES: [Rule; 22] = [
     of_fit::converged,
     of_fit::origins,
     of_errors::limits,
@@ -32,6 +32,7 @@ pub const RULES: [Rule; 21] = [
     of_fit::goodness,
     of_fit::stated_noise,
     of_data::single_joint,
+    of_data::verified_bodies,
     of_data::verified_joints,
     of_errors::urdf_alone,
     of_fit::warnings,

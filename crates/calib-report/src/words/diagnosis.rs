@@ -4,6 +4,7 @@ use super::prose::{code, full_stop};
 use crate::budget::Budget;
 use crate::shell_path;
 use crate::{Diagnosis, HeldOut, Output, ReasonId, Report, Unit, Verdict, number};
+use calib_finding::Fact;
 
 /// Multiples of the tracker's noise that a limit of the rms error should leave room for.
 const ROOM: f64 = 1.5;
@@ -190,6 +191,13 @@ fn of_reason(report: &Report, id: &str, again: &str) -> Option<[String; 2]> {
         ReasonId::WorseThanRegistration | ReasonId::NotBetterThanRegistration => {
             format!(
                 "Check that joints and tracker recorded the same motion at the same times, and record more poses; then run `{again}`."
+            )
+        }
+        ReasonId::BodyNotVerified => {
+            let body = reason.values.get("body").and_then(Fact::word);
+            format!(
+                "Record validation poses that show {}, with all joints moving; then run `{again}`.",
+                code(body.unwrap_or("every body"))
             )
         }
         ReasonId::TooFewToCompare => {

@@ -435,6 +435,26 @@ fn of_validation(reason: &Reason, v: &Values<'_>) -> String {
                 ),
             }
         }
+        ReasonId::BodyNotVerified => {
+            let body = code(v.name("body"));
+            match v.get("joints") {
+                Some(Fact::Names(joints)) => format!(
+                    "No held-out pose shows {body}: neither its mount nor {} verified.",
+                    match &joints[..] {
+                        [joint] => format!("{} is", code(joint)),
+                        _ => format!(
+                            "{} are",
+                            joints
+                                .iter()
+                                .map(|j| code(j))
+                                .collect::<Vec<_>>()
+                                .join(", ")
+                        ),
+                    }
+                ),
+                _ => format!("No held-out pose shows {body}: its mount is not verified."),
+            }
+        }
         ReasonId::JointsNotVerified => {
             let joints = match v.get("joints") {
                 Some(Fact::Names(names)) => names.clone(),

@@ -91,6 +91,29 @@ impl Levels {
         (0..count).map(|k| self.best_of(k, tests, drawn)).collect()
     }
 
+    /// The same, each one that lasted where that explains the data nearly as well: as much as chance could add to others.
+    pub fn best_that_lasted(&self, tests: &Tests, drawn: &[Drawn]) -> Vec<Option<Best>> {
+        /// Twice the log-likelihood ratio of 20 : 1.
+        const NEARLY: f64 = 6.0;
+        let best = self.best(tests, drawn).into_iter().enumerate();
+        let that_lasted = |k: usize, best: &Best| {
+            let level = best.level;
+            let u = &drawn[level].u[k];
+            let found = self.designs[level].best_in_order(k, &tests[level][k], u)?;
+            let score = self.score(level, drawn, found.gain);
+            (score > best.score - NEARLY).then_some(Best {
+                found,
+                level,
+                score,
+            })
+        };
+        best.map(|(k, best)| {
+            let best = best?;
+            Some(that_lasted(k, &best).unwrap_or(best))
+        })
+        .collect()
+    }
+
     fn best_of(&self, k: usize, tests: &Tests, drawn: &[Drawn]) -> Option<Best> {
         let levels = self.designs.iter().enumerate();
         let found = levels.filter_map(|(level, design)| {

@@ -11,7 +11,8 @@
 //! F is the minimum of the cost, N the count of rows, w, A, L and C those of the fit, P a wide prior that keeps jumps
 //! finite where nothing shows them. T, unlike Δ, does not depend on the stated level of the noise. Sums over ranges
 //! are differences of cumulative sums: the cost is linear in the samples. S is the end of one recording from some sample on,
-//! with other recordings as a whole on either side, because the order in which recordings were made is not known.
+//! with other recordings as a whole on either side, because the order in which recordings were made is not certain; the order of the samples is taken for
+//! it where that explains the data nearly as well.
 //!
 //! With few samples a change is taken for noise of the joints or of the bodies: the level of that noise is then chosen again with each
 //! change (`levels`).
@@ -373,7 +374,7 @@ impl Solution {
         let levels = Levels::new(self, &candidates, &used, &edges, borders)?;
         let design = &levels.designs[0];
         let tests = levels.tests();
-        let found = levels.best(&tests, &levels.seen());
+        let found = levels.best_that_lasted(&tests, &levels.seen());
         let seen: Vec<f64> = found
             .iter()
             .map(|f| f.as_ref().map_or(0.0, |f| f.score))

@@ -372,6 +372,28 @@ impl Design {
         self.beside_others(candidate, firsts.collect(), u)
     }
 
+    /// The largest Δ of the sets that have all later recordings, and none before: changes that lasted, where recordings are in the order in which they
+    /// were made.
+    pub(super) fn best_in_order(
+        &self,
+        candidate: usize,
+        tests: &[Test],
+        u: &DMatrix<f64>,
+    ) -> Option<Found> {
+        let mut own = vec![0.0; self.columns[candidate].len()];
+        let count = self.parts.len() - 1;
+        let lasts = |after: &After| after.others.iter().copied().eq(after.part + 1..count);
+        let tests = tests.iter().filter(|test| lasts(&test.after));
+        let gains = tests.map(|test| (test.gain(u, &mut own), test));
+        let gains = gains.filter(|(gain, _)| gain.is_finite());
+        let (_, best) = gains.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some(found(
+            &best.after,
+            &best.inverse,
+            &self.u_of(u, &best.after),
+        ))
+    }
+
     /// The best change near that of a coarser design, with the same other recordings.
     pub(super) fn best_near(&self, candidate: usize, coarse: &Self, near: &After) -> Option<Found> {
         let from = coarse.edges[near.first.saturating_sub(1)];

@@ -15,7 +15,7 @@ use crate::estimate::start::Start;
 use crate::formulate::contacts::add_contacts;
 use crate::formulate::formulation::{Formulation, FreeSet, MlFit, NoiseGroups, OwnLevels};
 use crate::prepare::conditions::{Conditions, conditions};
-use crate::prepare::inputs::Inputs;
+use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::tracks::BodyTrack;
 
 mod bodies;
@@ -231,7 +231,9 @@ pub(crate) fn found(formulation: Formulation, inputs: &Inputs, solution: Solutio
 /// All rows with known joint positions, recording after recording.
 fn samples(inputs: &Inputs) -> Vec<(String, usize)> {
     let mut samples = Vec::new();
-    for (name, loaded) in &inputs.recordings {
+    let mut recordings: Vec<(&String, &Loaded)> = inputs.recordings.iter().collect();
+    recordings.sort_by_key(|(_, loaded)| loaded.spec.place);
+    for (name, loaded) in recordings {
         samples.extend(
             loaded
                 .q

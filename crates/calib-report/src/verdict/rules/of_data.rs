@@ -132,6 +132,20 @@ fn warns(facts: &Facts, id: catalog::Id) -> bool {
     facts.warnings.iter().any(|warning| *warning == id.as_str())
 }
 
+pub(super) fn verified_bodies(facts: &Facts) -> Vec<Reason> {
+    let of = facts.unseen_bodies.iter().map(|body| {
+        let effect = match body.joints.is_empty() && !body.remounted {
+            true => Effect::Warns,
+            false => Effect::LeavesOpen,
+        };
+        let joints = (!body.joints.is_empty()).then(|| Fact::names(body.joints.clone()));
+        Reason::new(ReasonId::BodyNotVerified, effect)
+            .with("body", Fact::name(body.name.clone()))
+            .with_some("joints", joints)
+    });
+    of.collect()
+}
+
 pub(super) fn verified_joints(facts: &Facts) -> Vec<Reason> {
     if facts.not_verified.is_empty() {
         return Vec::new();

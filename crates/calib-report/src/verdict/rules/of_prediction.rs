@@ -15,7 +15,11 @@ pub(super) fn unless_confirmed(facts: &Facts) -> Effect {
         if (repeated as f64) < REPEATED * postures as f64);
     let met = |limit: &Limit| limit.outcome == Outcome::Met;
     let better = facts.improvements.iter().any(|i| i.p_better < SIGNIFICANT);
-    let combined = !facts.single_joint.held_out && facts.not_verified.is_empty();
+    let seen = facts
+        .unseen_bodies
+        .iter()
+        .all(|body| body.joints.is_empty());
+    let combined = !facts.single_joint.held_out && facts.not_verified.is_empty() && seen;
     if independent && combined && better && facts.limits.iter().all(met) {
         Effect::Warns
     } else {
