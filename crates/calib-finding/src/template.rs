@@ -1,7 +1,8 @@
 //! Sentences with places for values.
 //!
 //! `{key}` stands for a value: a number in the unit that people read, with three significant digits; `{key:um}` for a
-//! number in that unit; `{key:yaml-ms}` for milliseconds as YAML has them, without the unit; `{key} ± {sigma}` for a value with the digits that its standard deviation leaves; `{key:row}` for a count with its noun (`1 row`, `2 rows`). `[[ … ]]` is left out unless every
+//! number in that unit; `{key:yaml-ms}` for milliseconds as YAML has them, without the unit; `{key} ± {sigma}` for a value with the digits that its standard deviation leaves; `{key:row}` for a count with its noun (`1 row`, `2 rows`);
+//! `{key:size}` and `{key:percent-size}` for a number without its sign, which `{key:more-or-less}`, `{key:ahead-or-behind}` or `{key:faster-or-slower}` says in a word. `[[ … ]]` is left out unless every
 //! value in it is known.
 
 use crate::{Fact, Facts, Unit, number, printable_line};
@@ -114,6 +115,7 @@ fn with_sigma<'a>(inside: &str, after: &'a str, facts: &Facts) -> Option<(String
     else {
         return None;
     };
+    let (form, value) = sized(form, *value);
     let (factor, suffix) = scale(*unit, form);
     let (value, sigma) = number::rounded_pair(value * factor, sigma * factor)?;
     let text = if bracket {
@@ -124,6 +126,25 @@ fn with_sigma<'a>(inside: &str, after: &'a str, facts: &Facts) -> Option<(String
         format!("{value}{suffix} ± {sigma}{suffix}")
     };
     Some((text, after))
+}
+
+/// The word for the sign of a number, where a form asks for one.
+fn word(form: &str, value: f64) -> Option<&'static str> {
+    let (plus, minus) = match form {
+        "more-or-less" => ("more", "less"),
+        "ahead-or-behind" => ("ahead of", "behind"),
+        "faster-or-slower" => ("faster", "slower"),
+        _ => return None,
+    };
+    Some(if value < 0.0 { minus } else { plus })
+}
+
+/// A form without the ending that asks for a size, and the number without its sign where it has that ending.
+fn sized(form: &str, value: f64) -> (&str, f64) {
+    match form.strip_suffix("size") {
+        Some(unit) => (unit.trim_end_matches('-'), value.abs()),
+        None => (form, value),
+    }
 }
 
 /// The factor to the unit that `form` names, else to the unit that people read, and its suffix.
@@ -145,6 +166,10 @@ fn lone(value: f64, unit: Unit, form: &str) -> String {
     if form == "yaml-ms" {
         return format!("{:.1}", value * 1e3);
     }
+    if let Some(word) = word(form, value) {
+        return word.to_owned();
+    }
+    let (form, value) = sized(form, value);
     let (factor, suffix) = scale(unit, form);
     format!("{}{suffix}", significant(value * factor))
 }

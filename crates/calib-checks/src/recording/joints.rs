@@ -31,6 +31,8 @@ const READINGS: usize = 12;
 const FIVES: f64 = 0.5;
 /// Revolute joints turn at most this often to either side; more is degrees taken for radians.
 const MAX_TURNS: f64 = 1.5;
+/// The same of joints without limits, which count their turns: turntables go round a few times. Fewer turns are told by how the bodies moved.
+const MAX_TURNS_FREE: f64 = 10.0;
 
 pub(super) fn too_few(poses: &Poses, expected: &Expectations) -> Option<Finding> {
     let usable = (0..poses.len())
@@ -63,11 +65,13 @@ pub(super) fn units(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
             .limits
             .get(joint)
             .map(|(low, high)| low.abs().max(high.abs()));
-        let too_large =
-            largest > MAX_TURNS * TAU && limit.is_none_or(|limit| largest > 2.0 * limit);
-        if too_large {
-            let rows =
-                (0..poses.len()).filter(|&i| q[i].is_some_and(|q| q.abs() > MAX_TURNS * TAU));
+        let most = match limit {
+            Some(limit) => (MAX_TURNS * TAU).max(2.0 * limit),
+            None => MAX_TURNS_FREE * TAU,
+        };
+        if largest > most {
+            let is_large = |q: &Option<f64>| q.is_some_and(|q| q.abs() > MAX_TURNS * TAU);
+            let rows = (0..poses.len()).filter(|&i| is_large(&q[i]));
             findings.push(
                 Finding::of_kind(catalog::UNIT_MISMATCH, "degrees", Subject::joint(joint))
                     .with("largest", Fact::radians(largest))

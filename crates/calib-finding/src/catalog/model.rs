@@ -55,10 +55,10 @@ super::topic! {
     /// A joint moves more or less than its readings.
     JOINT_GAIN = "joint-gain" {
         "excess": Warning,
-            "Joint `{joint}` seems to move {excess:percent} (± {sigma:percent}) more than its readings say; this changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
+            "Joint `{joint}` seems to move {excess:percent-size} (± {sigma:percent}) {excess:more-or-less} than its readings say; this changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
             "Check the joint's transmission ratio. To estimate it, add `gain` to what is free of this joint in `solve: {joints: …}`.";
         "held_out": Warning,
-            "Joint `{joint}` seems to move {excess:percent} (± {sigma:percent}) more than its readings say: the fitted recordings hardly show it, but with its readings corrected the held-out errors are {best} rms in place of {none}.[[ Nearly as good: {alternatives:code}.]]",
+            "Joint `{joint}` seems to move {excess:percent-size} (± {sigma:percent}) {excess:more-or-less} than its readings say: the fitted recordings hardly show it, but with its readings corrected the held-out errors are {best} rms in place of {none}.[[ Nearly as good: {alternatives:code}.]]",
             "Check the joint's transmission ratio. To estimate it, add `gain` to what is free of this joint in `solve: {joints: …}`, and fit poses in which the joints move together.";
         "multiple": Warning,
             "The recordings fit the nominal robot to {none} rms, but to {best} if joint `{joint}` moves {factor} times as far as its column says[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
@@ -163,7 +163,7 @@ super::topic! {
             "The joint values of {recording:code} are {offset} ± {sigma} ahead of the tracker's data of their rows. This was estimated from the motion and corrected.",
             "Correct the times of the joint values if you can. The offset is taken into account.";
         "offset": Warning,
-            "The tracker's clock is {offset} ± {sigma} ahead of the robot's[[ and runs {drift:ppm} ± {sigma_drift:ppm} faster]].",
+            "The tracker's clock is {offset:size} ± {sigma} {offset:ahead-or-behind} the robot's[[ and runs {drift:ppm-size} ± {sigma_drift:ppm} {drift:faster-or-slower}]].",
             "Use a shared clock if you can. The offset is taken into account.";
         "ambiguous": Error,
             "Offsets of {first} and {second} explain the motion nearly equally well (ratio {ratio}).",

@@ -127,13 +127,16 @@ super::topic! {
     /// A gain of a sliding joint that the tracker's scale explains as well.
     GAIN_OR_SCALE = "gain-or-scale" {
         "": Warning,
-            "Joint `{joint}` moves {excess:percent} ± {sigma:percent} more than its readings say, {moves} over its range. A tracker whose lengths are too long by the same ratio gives the same data (negative: less, and too short): only the lengths of the robot distinguish the two.",
+            "Joint `{joint}` moves {excess:percent-size} ± {sigma:percent} {excess:more-or-less} than its readings say, {moves} over its range. A tracker whose lengths are off by the same ratio gives the same data: only the lengths of the robot distinguish the two.",
             "Measure a known length with the tracker: a scale bar, or two marks at a known distance, best as long as the range of the joint. Where the tracker is right, keep the gain; otherwise correct its lengths and take `gain` out of what is free.";
     }
     /// A number of the robot depends on the ratio of a joint that mimics another.
     MIMIC_RATIO = "mimic-ratio" {
         "another": Warning,
             "Joint `{joint}` follows `{source}` by {ratio} ± {sigma}, if that is estimated; the URDF states {stated}. The {quantity} is then {value} ± {value_sigma}, not {before}.",
+            "Correct `multiplier` in the URDF by the mechanism, or estimate it: `solve: {joints: {{joint}: {free: [offset, axis, gain]}}, prior: {gain_percent: 25}}`.";
+        "alone": Warning,
+            "Joint `{joint}` follows `{source}` by {ratio} ± {sigma}, if that is estimated; the URDF states {stated}. Over the recorded range that makes {size}.",
             "Correct `multiplier` in the URDF by the mechanism, or estimate it: `solve: {joints: {{joint}: {free: [offset, axis, gain]}}, prior: {gain_percent: 25}}`.";
         "taken": Info,
             "The {quantity} is known to {before_sigma} only if `{joint}` follows `{source}` by exactly {stated}, as the URDF states. With that estimated, {ratio} ± {sigma}, it is {value} ± {value_sigma}.",

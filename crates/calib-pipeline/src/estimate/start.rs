@@ -11,7 +11,7 @@
 //! Three small least-squares problems (one per coordinate of z) give R (projected onto SO(3)), t and p. Few rows leave (1) open; where
 //! the least residual over all rotations is much smaller, that rotation is taken.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 use calib_checks::structural::{PointRows, registration, registrations};
 use calib_geometry::decompose::solve_least_squares;
@@ -232,8 +232,21 @@ fn from_known_mounts(
     mean_pose(&poses)
 }
 
+/// Where the root of the nominal robot is by these bodies alone; `None` where they do not show it.
+#[must_use]
+pub fn registered(
+    inputs: &Inputs,
+    tracks: &BTreeMap<String, BodyTrack>,
+    bodies: &BTreeSet<&str>,
+) -> Option<Isometry3<f64>> {
+    let (tracked, mut points) = tracked_points(inputs, tracks, |name| bodies.contains(name));
+    let linear = solve_points(&tracked).unwrap_or_else(Isometry3::identity);
+    points.extend(tracked.into_iter().map(|t| t.rows));
+    Some(registration(&points, &linear)?.tracker_from_root)
+}
+
 fn from_points(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Isometry3<f64> {
-    let (tracked, mut points) = tracked_points(inputs, tracks);
+    let (tracked, mut points) = tracked_points(inputs, tracks, |_| true);
     let linear = solve_points(&tracked).unwrap_or_else(Isometry3::identity);
     points.extend(tracked.into_iter().map(|t| t.rows));
     let best = registration(&points, &linear);
@@ -243,7 +256,7 @@ fn from_points(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Isometr
 
 /// The rows of all points.
 fn point_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Vec<PointRows> {
-    let (tracked, mut points) = tracked_points(inputs, tracks);
+    let (tracked, mut points) = tracked_points(inputs, tracks, |_| true);
     points.extend(tracked.into_iter().map(|t| t.rows));
     points
 }
@@ -252,10 +265,11 @@ fn point_rows(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Vec<Poin
 fn tracked_points(
     inputs: &Inputs,
     tracks: &BTreeMap<String, BodyTrack>,
+    of: impl Fn(&str) -> bool,
 ) -> (Vec<Tracked>, Vec<PointRows>) {
     let mut tracked = Vec::new();
     let mut points: Vec<PointRows> = Vec::new();
-    for (name, body) in &inputs.robot.profile.bodies {
+    for (name, body) in inputs.robot.profile.bodies.iter().filter(|b| of(b.0)) {
         match &body.kind {
             BodyKind::Markers { names, .. } if tracks[name].template.is_none() => {
                 tracked.extend(

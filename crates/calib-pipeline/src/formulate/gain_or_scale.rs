@@ -45,11 +45,14 @@ pub(crate) fn findings(inputs: &Inputs, fit: &MlFit) -> Option<Finding> {
     if sureness(best) < CLEAR || !gains.iter().all(agrees) {
         return None;
     }
-    let range = inputs
+    let model = &inputs.robot.model;
+    let law = model.joint(model.joint_id(&best.joint).ok()?).law;
+    let rows = inputs
         .recordings
         .values()
-        .flat_map(|loaded| loaded.poses.joints.get(&best.joint));
-    let values = range.flatten().copied().flatten();
+        .flat_map(|loaded| loaded.q.iter().flatten());
+    let values = rows.map(|q| law.multiplier * q[law.source.index()]);
+    let values = values.filter(|q| q.is_finite());
     let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| {
         (low.min(q), high.max(q))
     });

@@ -51,7 +51,10 @@ pub(super) fn ratios(inputs: &Inputs, checked: &Checked, fit: &MlFit) -> Ratios 
     };
     let after = changes(&wide, &freed);
     let model = &inputs.robot.model;
-    let of_joint = |joint: &JointId| of_follower(model, *joint, &freed, (&before, &after));
+    let of_joint = |joint: &JointId| {
+        let found = of_follower(model, *joint, &freed, (&before, &after));
+        found.or_else(|| alone(inputs, *joint, &freed))
+    };
     let wider = before.iter().filter_map(|b| {
         let sigma = after.iter().find(|a| a.name == b.name)?.sigma?;
         (sigma > WIDER * b.sigma?).then(|| (b.name.clone(), sigma))
@@ -148,6 +151,42 @@ fn freed(solve: &Solve, model: &RobotModel, joint: JointId) -> Option<BTreeSet<J
             .chain(effects)
             .chain([JointFree::Effect(gain)])
             .collect(),
+    )
+}
+
+/// A joint whose ratio is another one, where no other number depends on it: what slides is as far off as its ratio says.
+fn alone(inputs: &Inputs, joint: JointId, freed: &MlFit) -> Option<Finding> {
+    let model = &inputs.robot.model;
+    let joint = model.joint(joint);
+    let mimic = joint.mimic?;
+    let gain = gain_of(&freed.solution.parameters, &joint.name)?;
+    let sigma = gain.sigma?;
+    let source = mimic.joint.index();
+    let read = inputs
+        .recordings
+        .values()
+        .flat_map(|r| r.q.iter().flatten());
+    let range = read.map(|q| q[source]).filter(|q| q.is_finite());
+    let (low, high) = range.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| {
+        (l.min(q), h.max(q))
+    });
+    let (least, unit) = match joint.kind.turns() {
+        true => (MATTERS.1, Unit::Radian),
+        false => (MATTERS.0, Unit::Meter),
+    };
+    let size = (gain.value * mimic.multiplier * (high - low)).abs();
+    if !(gain.value.abs() > REFUTED * sigma && size > least) {
+        return None;
+    }
+    Some(
+        Finding::of_kind(catalog::MIMIC_RATIO, "alone", Subject::joint(&joint.name))
+            .with_severity(Severity::Error)
+            .with("joint", Fact::name(&joint.name))
+            .with("source", Fact::name(&model.joint(mimic.joint).name))
+            .with("stated", Fact::ratio(mimic.multiplier))
+            .with("ratio", Fact::ratio(mimic.multiplier * (1.0 + gain.value)))
+            .with("sigma", Fact::ratio(mimic.multiplier.abs() * sigma))
+            .with("size", Fact::number(size, unit)),
     )
 }
 

@@ -13,6 +13,7 @@ mod layout;
 mod limits;
 mod merge;
 mod named;
+mod placed;
 mod twins;
 mod without;
 
@@ -40,6 +41,9 @@ const NOT_NOMINAL: f64 = 3.0;
 /// No tracker resolves less, m: three decimals of a millimeter are 0.5 µm.
 const COMPUTED: f64 = 3e-6;
 
+/// Rows that tell which of two robots is nearer to the recordings.
+const ROWS: usize = 200;
+
 /// A mistake that divides the residual by 1.5 raised it by more than this.
 const RAISED: f64 = 1.1;
 
@@ -56,14 +60,23 @@ pub struct Structural {
     pub of_fit: Correction,
 }
 
-/// The nominal robot with the couplings that the profile declares; `None` where its joints are no tree.
+/// The nominal robot with the places and the couplings that the profile leaves open as the bodies see them; `None` where its joints are no tree.
 #[must_use]
 pub fn chain(
     inputs: &Inputs,
     tracks: &BTreeMap<String, BodyTrack>,
 ) -> Option<(Chain, Vec<Coupling>)> {
-    let chain = Chain::from_model(&inputs.robot.model).ok()?;
-    let plain = Layout::new(inputs, tracks, &chain, false);
+    let mut chain = Chain::from_model(&inputs.robot.model).ok()?;
+    let mut plain = Layout::new(inputs, tracks, &chain, false);
+    let placed = placed::placed(inputs, tracks);
+    if let Some(placed) = placed.and_then(|model| Chain::from_model(&model).ok()) {
+        let there = Layout::new(inputs, tracks, &placed, false);
+        let residual =
+            |of: &Layout<'_>| registration_residual(&thin(&of.data, ROWS)).unwrap_or(f64::INFINITY);
+        if residual(&there) < residual(&plain) {
+            (chain, plain) = (placed, there);
+        }
+    }
     let couplings = declared::couplings(inputs, &plain.data);
     Some((declared::coupled(chain, &couplings), couplings))
 }
