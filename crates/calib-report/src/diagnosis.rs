@@ -223,7 +223,7 @@ fn changed(report: &Report) -> Option<Diagnosis> {
 }
 
 /// Findings that say what made the errors.
-pub(crate) const NAMED_CAUSES: [Id; 7] = [
+pub(crate) const NAMED_CAUSES: [Id; 8] = [
     catalog::TRACKER_SCALE,
     catalog::CHANGED_WHILE_RECORDING,
     catalog::MISSING_PHYSICS,
@@ -231,10 +231,12 @@ pub(crate) const NAMED_CAUSES: [Id; 7] = [
     CAUSES[1],
     CAUSES[2],
     CAUSES[3],
+    CAUSES[4],
 ];
 
 /// Findings that name a cause of errors without a test of the fit, the most likely first.
-const CAUSES: [Id; 4] = [
+const CAUSES: [Id; 5] = [
+    catalog::JOINTS_HELD,
     catalog::CLOCK_LAG,
     catalog::JOINT_GAIN,
     catalog::JOINT_COUPLING,

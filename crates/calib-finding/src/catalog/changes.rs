@@ -76,6 +76,12 @@ super::topic! {
             "Lengths in this recording are {scale:percent} (± {sigma:percent}) longer than in `{other}` (negative: shorter), alike for all bodies.",
             "Record again without calibrating the tracker in between, or leave the recording out. If its file was written with another scale, export it again.";
     }
+    /// Nothing of the joints is free although they are not as the URDF says.
+    JOINTS_HELD = "joints-held" {
+        "": Warning,
+            "Nothing of the joints is free. The fitted recordings are off by {none} rms, and by {best} with the offsets and axes of the joints free: the robot is not as its URDF says.",
+            "To calibrate the robot, add `joint_offsets` and `joint_axes` to `solve: {free: …}`. If it was to be verified as it is, the errors in the report are those of its URDF.";
+    }
     /// A joint stops off its readings by more than the others.
     JOINT_SCATTERS = "joint-scatters" {
         "rows": Warning,

@@ -53,6 +53,14 @@ impl Causes {
         missing.is_some_and(|missing| !missing.is_empty()) || self.change.is_some()
     }
 
+    /// Leaves neither changes nor missing effects: joints that are held explain them.
+    pub(crate) fn explained_by_held_joints(&mut self) {
+        (self.change, self.changed, self.scatter) = (None, None, None);
+        if let Some(goodness) = &mut self.goodness {
+            goodness.missing.clear();
+        }
+    }
+
     /// Takes out what other causes explain.
     pub fn leave_unexplained(&self, findings: &mut Vec<Finding>) {
         findings.retain(|finding| !self.explained.contains(finding));

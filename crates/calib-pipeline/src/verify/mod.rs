@@ -28,6 +28,7 @@ mod seen;
 mod suspects;
 pub(crate) mod tracker_noise;
 mod tried;
+mod unfreed;
 mod unseen;
 mod zeros;
 
@@ -48,6 +49,7 @@ use crate::verify::closure::close_loops;
 use crate::verify::known::{Known, Number, known_numbers};
 use crate::verify::moved::moved;
 use crate::verify::residuals::residual_rows;
+use crate::verify::unfreed::unfreed;
 
 /// What a solution is worth.
 #[derive(Debug)]
@@ -96,6 +98,11 @@ pub fn verified(
         },
     );
     verified.causes = causes;
+    let held = fit.and_then(|fit| unfreed(inputs, checked, fit, &verified.causes));
+    if let Some(held) = held {
+        verified.causes.explained_by_held_joints();
+        verified.findings.push(held);
+    }
     verified.findings.extend(fit.and_then(not_tested));
     let missing = verified.causes.goodness.as_ref();
     let missing = missing.is_some_and(|g| !g.missing.is_empty());
