@@ -62,6 +62,7 @@ mod robots;
 mod scratch;
 mod screens;
 mod selection;
+mod sessions;
 mod shown;
 mod sizes;
 mod slips;

@@ -12,10 +12,10 @@
 
 use std::ops::Range;
 
-use nalgebra::{Isometry3, Matrix2, Point3, SMatrix, SVector, Vector2, Vector3};
+use nalgebra::{Isometry3, Matrix2, Point3, SMatrix, Vector2, Vector3};
 
 use super::offset::{BLOCKS, ClockMap, OF_BLOCKS, OffsetOutcome, OffsetSettings};
-use super::rigid::{Rigid, as_rigid};
+use super::rigid::{Regressors, Rigid, SIZE, about_mean, as_rigid};
 use crate::statistics::median;
 
 /// Positions at times of one clock; lost samples are left out.
@@ -32,10 +32,6 @@ pub struct LinkTrack {
     x: Vec<Regressors>,
     step: f64,
 }
-
-/// Numbers of x in equation (1).
-pub(super) const SIZE: usize = 13;
-pub(super) type Regressors = SVector<f64, SIZE>;
 
 /// A marker must move by this, m rms: ten times what nominal kinematics leave unexplained.
 const MIN_MOTION: f64 = 0.03;
@@ -213,11 +209,6 @@ fn left_at(seen: &[(f64, Point3<f64>)], link: &LinkTrack, offset: f64) -> Option
     let total = squares(&about_mean(&y));
     let left = squares(&Projection::new(x)?.left(&y));
     (total > 0.0).then(|| left / total * (n - 1) as f64 / (n - SIZE) as f64)
-}
-
-pub(super) fn about_mean(y: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
-    let mean = y.iter().sum::<Vector3<f64>>() / y.len().max(1) as f64;
-    y.iter().map(|y| y - mean).collect()
 }
 
 /// The map between two clocks from a marker's motion and that of its link: `a` from the tracker, `b` from the robot.

@@ -5,8 +5,11 @@ use nalgebra::{
     Isometry3, Matrix3, Point3, SMatrix, SVector, Translation3, UnitQuaternion, Vector3,
 };
 
-use super::point::{Regressors, SIZE, about_mean};
 use crate::structural::registration;
+
+/// Numbers of x in equation (1).
+pub(super) const SIZE: usize = 13;
+pub(super) type Regressors = SVector<f64, SIZE>;
 
 /// Changes of R₀, t₀ and m.
 const CHANGES: usize = 9;
@@ -129,4 +132,9 @@ fn pose_of(x: &Regressors) -> Isometry3<f64> {
         Translation3::new(x[1], x[2], x[3]),
         UnitQuaternion::from_matrix(&rotation),
     )
+}
+
+pub(super) fn about_mean(y: &[Vector3<f64>]) -> Vec<Vector3<f64>> {
+    let mean = y.iter().sum::<Vector3<f64>>() / y.len().max(1) as f64;
+    y.iter().map(|y| y - mean).collect()
 }

@@ -56,10 +56,10 @@ super::topic! {
     JOINT_GAIN = "joint-gain" {
         "excess": Warning,
             "Joint `{joint}` seems to move {excess:percent-size} (± {sigma:percent}) {excess:more-or-less} than its readings say; this changes the registration by {effect} rms.[[ Nearly as good: {alternatives:code}.]]",
-            "Check the joint's transmission ratio. To estimate it, add `gain` to what is free of this joint in `solve: {joints: …}`.";
+            "Check the joint's transmission ratio.[[ To estimate it, state `solve: {joints: {{joint}: {free: {free:list}}}}`.]]";
         "held_out": Warning,
             "Joint `{joint}` seems to move {excess:percent-size} (± {sigma:percent}) {excess:more-or-less} than its readings say: the fitted recordings hardly show it, but with its readings corrected the held-out errors are {best} rms in place of {none}.[[ Nearly as good: {alternatives:code}.]]",
-            "Check the joint's transmission ratio. To estimate it, add `gain` to what is free of this joint in `solve: {joints: …}`, and fit poses in which the joints move together.";
+            "Check the joint's transmission ratio.[[ To estimate it, state `solve: {joints: {{joint}: {free: {free:list}}}}`, and fit poses in which the joints move together.]]";
         "multiple": Warning,
             "The recordings fit the nominal robot to {none} rms, but to {best} if joint `{joint}` moves {factor} times as far as its column says[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
             "The fit estimates this gain. Look for a ratio near {factor} that explains it: of the gear, of the counts per turn, or of the units of this column.";

@@ -89,7 +89,7 @@ super::topic! {
     MISSING_PHYSICS = "missing-physics" {
         "effect": Warning,
             "{physics} (`{parameter}`): explains {explains:percent} of χ², p = {p_value}.[[ Nearly as good: {alternatives:code}.]]",
-            "Enable the effect under `solve.free` or `solve.joints`, and compare the held-out errors.";
+            "Enable the effect under `solve.free`, or for this joint alone[[: `solve: {joints: {{joint}: {free: {free:list}}}}`]]. Compare the held-out errors.";
         "clock": Warning,
             "{physics} (`{parameter}`): explains {explains:percent} of χ², p = {p_value}.[[ Nearly as good: {alternatives:code}.]]",
             "Let the fit estimate it: `timing: {poses: continuous, clock: estimate}` in {recording:code} and in the recordings made in the same way. Or record in holds.";

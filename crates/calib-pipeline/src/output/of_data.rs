@@ -15,6 +15,7 @@ use crate::formulate::formulation::MlFit;
 use crate::formulate::late::with_late_joint;
 use crate::output::counts::{Tracks, count, rows};
 use crate::output::evidence::Evidence;
+use crate::prepare::effects::free_with;
 use crate::prepare::inputs::{Inputs, Loaded};
 use crate::verify::residuals::subject;
 
@@ -209,7 +210,18 @@ pub(crate) fn missing_finding(e: &Evidence<'_>, missing: &MissingPhysics) -> Fin
             let finding = kind("latency").with("recordings", Fact::names(timed.map(|r| &r.name)));
             with_late_joint(finding, e.inputs, joint, missing.estimate)
         }
-        (None, None) => kind("effect"),
+        (None, None) => {
+            let effects = calib_core::EFFECTS.iter().copied();
+            let mut effects = effects.filter(|effect| effect.profile.is_some());
+            let found = effects.find_map(|effect| Some((of(effect)?, effect)));
+            let finding = kind("effect");
+            match found
+                .and_then(|(joint, effect)| Some((joint, free_with(e.inputs, joint, effect)?)))
+            {
+                Some((joint, free)) => finding.with("joint", Fact::name(joint)).with("free", free),
+                None => finding,
+            }
+        }
     };
     let alike = e.causes.alike.iter();
     let alike = alike.filter(|(name, _)| *name == missing.parameter);

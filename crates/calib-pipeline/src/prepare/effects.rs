@@ -1,7 +1,8 @@
 //! The effects of plugins that a profile names, made ready and tried.
 
-use calib_core::JointState;
-use calib_core::effect::EFFECTS;
+use calib_core::effect::{EFFECTS, Effect};
+use calib_core::{EffectKind, JointState};
+use calib_finding::Fact;
 use calib_plugin::{DependsOn, PluginError};
 use calib_profile::{Free, FreeEffect, Method};
 
@@ -103,4 +104,18 @@ pub(crate) fn evaluate(inputs: &Inputs) -> Result<(), PipelineError> {
         }
     }
     Ok(inputs.estimators.evaluated()?)
+}
+
+/// What the profile is to state as free of a joint, so that an effect is free beside what is free of it now; `None` for an unknown joint.
+pub(crate) fn free_with(inputs: &Inputs, joint: &str, effect: &'static Effect) -> Option<Fact> {
+    let model = &inputs.robot.model;
+    let id = model.joint_id(joint).ok()?;
+    let solve = &inputs.robot.profile.solve;
+    let free = solve.free_with(id, !model.joint(id).kind.turns(), effect);
+    Some(Fact::names(free.iter().map(|free| free.key().to_owned())))
+}
+
+/// The same of its gain.
+pub(crate) fn free_with_gain(inputs: &Inputs, joint: &str) -> Option<Fact> {
+    free_with(inputs, joint, EffectKind::Gain.effect())
 }

@@ -165,7 +165,8 @@ pub fn rows_of(
     found.into_iter().cloned().collect()
 }
 
-/// The finding on a memory of everything that is seen, where a tracker that moved is all that it is.
+/// The finding on a memory of the noise, where it is all that the change makes of successive rows: a step that most of the residuals are, or of
+/// everything that is seen, a tracker that moved.
 pub fn memory_of<'f>(
     change: &Change,
     findings: &'f [Finding],
@@ -174,9 +175,12 @@ pub fn memory_of<'f>(
         change.moved,
         Moved::Reference(_) | Moved::Drift(_) | Moved::Settling(_)
     );
+    /// Share of the cost.
+    const MOST: f64 = 0.5;
+    let most = change.explains > MOST;
     let kind = |f: &Finding| f.facts.get("kind").and_then(Fact::word) == Some("together");
     let all = findings.iter();
-    all.filter(move |f| tracker && f.id == catalog::NOISE_HAS_MEMORY && kind(f))
+    all.filter(move |f| f.id == catalog::NOISE_HAS_MEMORY && (most || tracker && kind(f)))
 }
 
 /// The joint that scatters.

@@ -22,6 +22,7 @@ use crate::formulate::checked::Checked;
 use crate::formulate::formulation::MlFit;
 use crate::formulate::kinematics::Calibration;
 use crate::formulate::parts::open_joints;
+use crate::prepare::effects::free_with_gain;
 use crate::prepare::inputs::Inputs;
 use crate::verify::Verified;
 use crate::verify::accuracy::configuration;
@@ -93,6 +94,7 @@ pub(super) fn of_held_out(
         finding
             .with("joint", Fact::name(name(best.joint)))
             .with("excess", Fact::ratio(best.excess))
+            .with_some("free", free_with_gain(inputs, name(best.joint)))
             .with("sigma", Fact::ratio(best.sigma))
             .with("none", Fact::meters(none.sqrt()))
             .with("best", Fact::meters(left.sqrt()))

@@ -4,11 +4,10 @@
 //! link, to within the noise. The fit takes the ratio as exact, and states how well it knows the length under that condition. Here the ratio is freed, with
 //! a prior as wide as couplings of real hands are off, and everything is fitted again: what changes then is said.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
-use calib_core::{ParameterEstimate, ParameterKind, Settings};
+use calib_core::{EffectKind, ParameterEstimate, ParameterKind, Settings};
 use calib_finding::{Fact, Finding, Severity, Subject, Unit, catalog};
-use calib_profile::{JointFree, OriginFreeSet, Solve};
 use calib_report::RobotChange;
 use calib_urdf::{JointId, RobotModel};
 
@@ -105,8 +104,9 @@ fn with_ratios(
     let mut inputs = inputs.clone();
     let model = &inputs.robot.model;
     let solve = &mut inputs.robot.profile.solve;
+    let gain = EffectKind::Gain.effect();
     for joint in followers {
-        let free = freed(solve, model, *joint)?;
+        let free = solve.free_with(*joint, !model.joint(*joint).kind.turns(), gain);
         solve.joints.entry(*joint).or_default().free = Some(free);
     }
     let mut settings = Settings::default();
@@ -127,31 +127,6 @@ fn with_ratios(
     }
     let fit = ml::fit(stated, &inputs, &settings).ok()?;
     Some((inputs, fit))
-}
-
-/// What is free of a joint, and its gain.
-fn freed(solve: &Solve, model: &RobotModel, joint: JointId) -> Option<BTreeSet<JointFree>> {
-    let now = solve.free_set(joint, true, !model.joint(joint).kind.turns());
-    let origin = match now.origin {
-        OriginFreeSet::Held => None,
-        OriginFreeSet::Axis => Some(JointFree::Axis),
-        OriginFreeSet::Full => Some(JointFree::Origin),
-    };
-    let gain = calib_core::EFFECTS
-        .iter()
-        .find(|effect| effect.id == "gain")?;
-    let effects = now
-        .effects
-        .iter()
-        .filter(|free| free.effect.profile.is_some());
-    let effects = effects.map(|free| JointFree::Effect(free.effect));
-    Some(
-        origin
-            .into_iter()
-            .chain(effects)
-            .chain([JointFree::Effect(gain)])
-            .collect(),
-    )
 }
 
 /// A joint whose ratio is another one, where no other number depends on it: what slides is as far off as its ratio says.

@@ -101,6 +101,30 @@ impl JointFreeSet {
 }
 
 impl Solve {
+    /// What is to be stated under `free` of a joint, so that an effect is free beside what is free of it now.
+    #[must_use]
+    pub fn free_with(
+        &self,
+        joint: JointId,
+        slides: bool,
+        effect: &'static Effect,
+    ) -> BTreeSet<JointFree> {
+        let now = self.free_set(joint, true, slides);
+        let origin = match now.origin {
+            OriginFreeSet::Held => None,
+            OriginFreeSet::Axis => Some(JointFree::Axis),
+            OriginFreeSet::Full => Some(JointFree::Origin),
+        };
+        // What plugins have is stated elsewhere.
+        let effects = now
+            .effects
+            .iter()
+            .filter(|free| free.effect.profile.is_some());
+        let effects = effects.map(|free| JointFree::Effect(free.effect));
+        let all = origin.into_iter().chain(effects);
+        all.chain([JointFree::Effect(effect)]).collect()
+    }
+
     /// What is free of `joint`; `moved` tells whether the fitted recordings move it, `slides` whether it is prismatic.
     #[must_use]
     pub fn free_set(&self, joint: JointId, moved: bool, slides: bool) -> JointFreeSet {

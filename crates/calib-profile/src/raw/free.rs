@@ -152,6 +152,14 @@ impl JsonSchema for RawFree {
     }
 }
 
+impl RawJointFree {
+    /// As a profile states it.
+    #[must_use]
+    pub fn key(&self) -> &'static str {
+        key_of(&JOINT_FREE, self)
+    }
+}
+
 impl<'de> Deserialize<'de> for RawJointFree {
     fn deserialize<D: Deserializer<'de>>(from: D) -> Result<Self, D::Error> {
         from.deserialize_str(OneOf(&JOINT_FREE, &JOINT_FREE_KEYS))

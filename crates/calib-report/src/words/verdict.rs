@@ -358,6 +358,27 @@ fn of_prediction(reason: &Reason, v: &Values<'_>) -> String {
     }
 }
 
+fn body_not_verified(v: &Values<'_>) -> String {
+    let body = code(v.name("body"));
+    match v.get("joints") {
+        Some(Fact::Names(joints)) => format!(
+            "No held-out pose shows {body}: neither its mount nor {} verified.",
+            match &joints[..] {
+                [joint] => format!("{} is", code(joint)),
+                _ => format!(
+                    "{} are",
+                    joints
+                        .iter()
+                        .map(|j| code(j))
+                        .collect::<Vec<_>>()
+                        .join(", ")
+                ),
+            }
+        ),
+        _ => format!("No held-out pose shows {body}: its mount is not verified."),
+    }
+}
+
 fn of_validation(reason: &Reason, v: &Values<'_>) -> String {
     let postures = || counted(v.count("postures"), "posture");
     match reason.id {
@@ -435,26 +456,7 @@ fn of_validation(reason: &Reason, v: &Values<'_>) -> String {
                 ),
             }
         }
-        ReasonId::BodyNotVerified => {
-            let body = code(v.name("body"));
-            match v.get("joints") {
-                Some(Fact::Names(joints)) => format!(
-                    "No held-out pose shows {body}: neither its mount nor {} verified.",
-                    match &joints[..] {
-                        [joint] => format!("{} is", code(joint)),
-                        _ => format!(
-                            "{} are",
-                            joints
-                                .iter()
-                                .map(|j| code(j))
-                                .collect::<Vec<_>>()
-                                .join(", ")
-                        ),
-                    }
-                ),
-                _ => format!("No held-out pose shows {body}: its mount is not verified."),
-            }
-        }
+        ReasonId::BodyNotVerified => body_not_verified(&v),
         ReasonId::JointsNotVerified => {
             let joints = match v.get("joints") {
                 Some(Fact::Names(names)) => names.clone(),

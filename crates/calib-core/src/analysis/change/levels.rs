@@ -101,10 +101,11 @@ impl Levels {
             let u = &drawn[level].u[k];
             let found = self.designs[level].best_in_order(k, &tests[level][k], u)?;
             let score = self.score(level, drawn, found.gain);
+            // How clear it is that something changed does not depend on when.
             (score > best.score - NEARLY).then_some(Best {
                 found,
                 level,
-                score,
+                score: best.score,
             })
         };
         best.map(|(k, best)| {

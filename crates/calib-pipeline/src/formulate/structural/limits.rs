@@ -11,6 +11,7 @@ use super::codes;
 use super::layout::Layout;
 use crate::formulate::late::with_late_joint;
 use crate::prepare::aligned::ClockUnknowns;
+use crate::prepare::effects::free_with_gain;
 
 /// Findings beside the decision; `consistent`: nothing but what the fit estimates is named.
 #[must_use]
@@ -122,6 +123,7 @@ fn continuous_finding(layout: &Layout<'_>, found: &Continuous) -> Option<Finding
             Finding::of_kind(catalog::JOINT_GAIN, "excess", Subject::joint(name))
                 .with("joint", Fact::name(name))
                 .with("excess", Fact::ratio(factor - 1.0))
+                .with_some("free", free_with_gain(layout.inputs, name))
         }
         Hypothesis::Coupling {
             joint,
