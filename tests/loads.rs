@@ -228,7 +228,7 @@ fn the_urdf_fitted_without_effects_predicts_better_than_the_one_whose_effects_ar
             .split_whitespace()
             .collect::<Vec<_>>()
             .join(" ");
-    assert!(said.contains("use it with the effects only"), "{said}");
+    assert!(said.contains("use it only with the effects"), "{said}");
     // As a robot of its own, with nothing free but where it stands, the file does what was stated of it.
     let alone = dir.read("out/arm.calibrated.alone.urdf");
     let registered = heavy.replace(", joint_offsets, joint_axes, compliance", "");

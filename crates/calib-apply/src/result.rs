@@ -83,7 +83,7 @@ pub fn find(path: &Path, force: bool) -> Result<Calibrated, ApplyError> {
             held_out.and_then(|h| Some((h.urdf_alone?, h.registration_only?)))
         {
             notes.push(format!(
-                "without these effects this URDF predicts new poses to {:.2} mm rms, the untouched one to {:.2} mm: use it with the effects only",
+                "without these effects this URDF predicts new poses to {:.2} mm rms, the untouched one to {:.2} mm: use it only with the effects",
                 1e3 * alone.rms_m,
                 1e3 * untouched.rms_m
             ));

@@ -91,6 +91,24 @@ pub(crate) fn table(file: &RobotModelFile, chain: &[usize], hayati: bool) -> Tab
     }
 }
 
+/// The first two joints whose common normal lies far beyond the robot, and how far, m; `None` where none does.
+pub(crate) fn far<'t>(
+    file: &RobotModelFile,
+    chain: &[usize],
+    table: &'t Table,
+) -> Option<(&'t str, &'t str, f64)> {
+    /// Times the robot's size: no tool is mounted so far from its arm.
+    const FAR: f64 = 10.0;
+    let (lines, end) = lines(file, chain);
+    let first = lines.first()?.point;
+    let points = lines.iter().map(|line| line.point);
+    let points = points.chain([Point3::from(end.translation.vector)]);
+    let size = points.map(|p| (p - first).norm()).fold(0.0, f64::max);
+    let mut pairs = table.rows.windows(2);
+    let pair = pairs.find(|pair| pair[0].d.abs() > FAR * size)?;
+    Some((&pair[0].joint, &pair[1].joint, pair[0].d.abs()))
+}
+
 /// Axes of the joints that move, with mimics at their own zero; and root_from_tool there.
 pub(crate) fn lines(file: &RobotModelFile, chain: &[usize]) -> (Vec<Line>, Isometry3<f64>) {
     let mut at = Isometry3::identity();

@@ -134,7 +134,7 @@ impl Asked<'_> {
         let model = evaluated(&alone).map_err(|e| self.of_model(&e))?;
         let held = truth(&model, self.link, &self.held_out);
         let mut out = self.costing(&held, Vec::new());
-        let notes = self.notes(&out, None);
+        let mut notes = self.notes(&out, None);
         // What was written is evaluated by its own formulas, where it has any.
         let mut seen = None;
         out.text = match self.target {
@@ -143,6 +143,11 @@ impl Asked<'_> {
                 let table = dh::table(&alone, &self.chain, hayati);
                 let at = |q: &Vec<f64>| dh::forward(&table, &|name| by_name(&model, q, name));
                 seen = Some(self.held_out.iter().map(at).collect::<Vec<_>>());
+                if let Some((one, other, meters)) = dh::far(&alone, &self.chain, &table) {
+                    notes.push(format!(
+                        "The axes of {one} and {other} are nearly parallel: their common normal is {meters:.0} m away, and small errors move it by meters. The numbers are exact together; in `--to hayati` none is far."
+                    ));
+                }
                 yaml::dh(&self.head(&notes), &table, hayati)
             }
             Target::Poe => {

@@ -132,8 +132,8 @@ enum How {
 
 /// What takes out of a column what changes of A explain.
 enum Explains {
-    Free(Projection),
-    Rigid(Rigid),
+    Free(Box<Projection>),
+    Rigid(Box<Rigid>),
 }
 
 impl Explains {
@@ -347,11 +347,11 @@ impl Common {
             How::Free => {
                 let projection = Projection::new(x)?;
                 let a = projection.fit(&y).transpose();
-                (a, Explains::Free(projection))
+                (a, Explains::Free(Box::new(projection)))
             }
             How::Rigid => {
                 let rigid = Rigid::new(&x, &y)?;
-                (rigid.a(), Explains::Rigid(rigid))
+                (rigid.a(), Explains::Rigid(Box::new(rigid)))
             }
         };
         let left: Vec<Vector3<f64>> = match &projection {

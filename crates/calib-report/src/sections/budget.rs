@@ -4,7 +4,7 @@ use super::Page;
 use crate::budget::{Budget, BudgetRow};
 use crate::table::Table;
 use crate::words::budget::{caption, certificate, coverage, freedom, measurand};
-use crate::{Report, Unit, number};
+use crate::{Report, Unit, Verdict, number};
 
 pub(super) fn budget(page: &mut Page, report: &Report) {
     let Some(budget) = Budget::of(report) else {
@@ -48,7 +48,10 @@ pub(super) fn budget(page: &mut Page, report: &Report) {
     ));
     table.row(sum(expanded, String::new(), budget.expanded_m(), ""));
     page.table(&caption(report), table);
-    page.text("For a certificate:");
+    page.text(match report.verdict {
+        Verdict::Accepted | Verdict::AcceptedWithWarnings => "For a certificate:",
+        _ => "In short, of a result that is not accepted and certifies nothing:",
+    });
     page.code("text", &certificate(report, &budget));
     page.text(coverage(&budget));
 }

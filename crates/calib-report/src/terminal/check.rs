@@ -99,7 +99,8 @@ fn findings(of: &DataChecks, look: Look) -> String {
                 0 => String::new(),
                 n => format!(" and {n} more"),
             };
-            text += &format!(" (rows {}{more})", shown.join(", "));
+            let word = if f.rows.len() == 1 { "row" } else { "rows" };
+            text += &format!(" ({word} {}{more})", shown.join(", "));
         }
         text.push('\n');
         text += &wrap(&f.text(), look.columns, "  ", "  ");

@@ -62,7 +62,13 @@ pub(crate) fn headline(report: &Report) -> Headline {
             )
         },
     );
+    // Held-out errors that are by chance no larger than the tracker's noise do not make the robot better than the fit says.
+    let stated: f64 = known(report)
+        .filter(|(kind, _)| *kind != ErrorSource::TrackerNoise)
+        .map(|(_, m)| m * m)
+        .sum();
     let robot = held_out.expected.and_then(|e| e.without_tracker());
+    let robot = robot.map(|robot| robot.max(stated.sqrt()));
     Headline {
         quantity: if held_out.left_out {
             "Position error, leave-one-out"

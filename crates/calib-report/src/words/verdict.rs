@@ -396,10 +396,13 @@ fn of_validation(reason: &Reason, v: &Values<'_>) -> String {
             v.number("p")
         ),
         ReasonId::TooFewToCompare => format!(
-            "Calibrated {} rms, with registration only {} rms: {} are too few to tell whether that is an improvement. Five that all are better would show it.",
+            "Calibrated {} rms, with registration only {} rms: {} too few to tell whether that is an improvement. Five that all are better would show it.",
             v.number("calibrated"),
             v.number("registration"),
-            postures()
+            match v.count("postures") {
+                1 => "1 posture is".to_owned(),
+                _ => format!("{} are", postures()),
+            }
         ),
         ReasonId::UrdfAlone => {
             let error = format!(
@@ -416,10 +419,10 @@ fn of_validation(reason: &Reason, v: &Values<'_>) -> String {
             };
             match (reason.effect, v.get("limit")) {
                 (Effect::Warns, Some(_)) => format!(
-                    "{error} (limit {}): use it with the effects only.",
+                    "{error} (limit {}): use it only with the effects.",
                     v.number("limit")
                 ),
-                (Effect::Warns, None) => format!("{error}: use it with the effects only."),
+                (Effect::Warns, None) => format!("{error}: use it only with the effects."),
                 _ => format!("{error}."),
             }
         }
@@ -456,7 +459,7 @@ fn of_validation(reason: &Reason, v: &Values<'_>) -> String {
                 ),
             }
         }
-        ReasonId::BodyNotVerified => body_not_verified(&v),
+        ReasonId::BodyNotVerified => body_not_verified(v),
         ReasonId::JointsNotVerified => {
             let joints = match v.get("joints") {
                 Some(Fact::Names(names)) => names.clone(),

@@ -6,8 +6,8 @@ use std::path::Path;
 use calib_report::{
     Agreement, Compared, Effect, FitEnd, FoundNoise, Goodness, ImplausibleChange, Improvement,
     Limit, Limited, Orientation, Part, Predicted, Prediction, Reason, ReasonId, RejectedPart,
-    Share, SingleJoint, Solver, Unit, Untested, UntestedKind, UrdfAlone, Validation, Verdict,
-    VerdictFacts, judge,
+    Share, SingleJoint, Solver, Unit, UnseenBody, Untested, UntestedKind, UrdfAlone, Validation,
+    Verdict, VerdictFacts, judge,
 };
 
 /// A result against which nothing speaks.
@@ -577,6 +577,21 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
         (ReasonId::UrdfAlone, Supports, alone(0.0005, None)),
         (ReasonId::UrdfAlone, Warns, alone(0.0007, None)),
         (
+            ReasonId::BodyNotVerified,
+            Warns,
+            with(|f| f.unseen_bodies = vec![unseen(&[], false)]),
+        ),
+        (
+            ReasonId::BodyNotVerified,
+            LeavesOpen,
+            with(|f| f.unseen_bodies = vec![unseen(&["elbow"], false)]),
+        ),
+        (
+            ReasonId::BodyNotVerified,
+            LeavesOpen,
+            with(|f| f.unseen_bodies = vec![unseen(&[], true)]),
+        ),
+        (
             ReasonId::JointsNotVerified,
             Warns,
             with(|f| f.not_verified = vec!["elbow".into()]),
@@ -584,6 +599,14 @@ fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
     ];
     out.extend(open);
     out
+}
+
+fn unseen(joints: &[&str], remounted: bool) -> UnseenBody {
+    UnseenBody {
+        name: "tool".into(),
+        joints: joints.iter().map(|joint| (*joint).to_owned()).collect(),
+        remounted,
+    }
 }
 
 fn verdict_of(effect: Effect) -> Verdict {

@@ -29,7 +29,7 @@ pub(super) fn placed(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> O
     let mut limbs: BTreeMap<Option<JointId>, BTreeSet<&str>> = BTreeMap::new();
     for (name, body) in &inputs.robot.profile.bodies {
         let above = model.chain_to_root(body.link).into_iter();
-        let first = above.filter(|joint| open.contains(joint)).last();
+        let first = above.rev().find(|joint| open.contains(joint));
         limbs.entry(first).or_default().insert(name);
     }
     let seen = limbs.into_iter().filter_map(|(joint, bodies)| {
