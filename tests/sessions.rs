@@ -286,6 +286,44 @@ fn a_body_that_no_held_out_pose_shows_leaves_the_verdict_open() {
     }
 }
 
+/// Meters under a name that says millimeters, and the other way round.
+#[test]
+fn a_stated_noise_in_another_unit_is_named_by_a_check() {
+    let joints = arm("a", "root");
+    let robot = robot(&joints, 1e-3, 9);
+    let cell = Cell {
+        robot: &robot,
+        bodies: &TOOL,
+        range: &wide,
+    };
+    let recordings = [("poses", "static"), ("checks", "validation")];
+    for (stated, kind) in [
+        ("0.15", None),
+        ("0.00015", Some("above")),
+        ("150", Some("below")),
+    ] {
+        let text = profile(&TOOL, &recordings, FREE);
+        let text = text.replace(
+            "marker_sigma_mm: 0.15",
+            &format!("marker_sigma_mm: {stated}"),
+        );
+        let dir = Scratch::new()
+            .file("r.urdf", urdf(&joints, 0.0, 0))
+            .file("r.yaml", text)
+            .file("poses.csv", cell.table(30, 91))
+            .file("checks.csv", cell.table(12, 92));
+        let ran = dir.calib(["check", "r.yaml", "--json"]);
+        let said: Value = serde_json::from_str(&ran.stdout).expect("JSON");
+        let findings = said["findings"].as_array().expect("a list").iter();
+        let found: Vec<_> = findings.filter(|f| f["id"] == "noise-stated").collect();
+        assert_eq!(
+            found.first().and_then(|f| f["facts"]["kind"].as_str()),
+            kind,
+            "{said:#}"
+        );
+    }
+}
+
 /// A turntable that went round twice, and counts its turns.
 #[test]
 fn a_joint_without_limits_may_go_round() {

@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 
 use calib_core::Settings;
-use calib_finding::{Finding, Severity, catalog};
+use calib_finding::{Fact, Finding, Severity, Subject, catalog};
 use calib_geometry::statistics::median;
 use calib_profile::{BodyKind, Method, Usage};
 use calib_report::{BodyNoise, CheckOutcome, Checked, CheckedRecording, DataCheck, DataChecks};
@@ -56,6 +56,7 @@ pub fn check(profile: &Path, plugins: Plugins) -> Result<DataChecks, PipelineErr
     match body_tracks(&inputs, &mut findings) {
         Ok(tracks) => {
             noise = noise_of(&inputs, &tracks);
+            findings.extend(noise.iter().filter_map(noise_is_stated));
             moved = true;
             let start = start(&inputs, &tracks);
             model_checks::before_the_fit(&inputs, &tracks, &start, &mut findings);
@@ -156,6 +157,26 @@ fn noise_of(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Vec<BodyNo
         stated_m: inputs.robot.profile.tracker.marker_sigma,
     });
     of.collect()
+}
+
+/// Where the stated noise is another one than that of the markers about their body: a unit, most often.
+fn noise_is_stated(of: &BodyNoise) -> Option<Finding> {
+    /// A body's own scatter, of a few rows, and a tracker's data sheet differ by less.
+    const ABOVE: f64 = 5.0;
+    /// What is smoothed or averaged scatters by less than a data sheet says; a unit is a thousand.
+    const BELOW: f64 = 100.0;
+    let (sigma, stated) = (of.sigma_m?, of.stated_m?);
+    let (kind, ratio, most) = match sigma > stated {
+        true => ("above", sigma / stated, ABOVE),
+        false => ("below", stated / sigma, BELOW),
+    };
+    (ratio > most && ratio.is_finite()).then(|| {
+        Finding::of_kind(catalog::NOISE_STATED, kind, Subject::body(&of.body))
+            .with("body", Fact::name(&of.body))
+            .with("sigma", Fact::meters(sigma))
+            .with("stated", Fact::meters(stated))
+            .with("ratio", Fact::ratio(ratio))
+    })
 }
 
 fn recordings(inputs: &Inputs) -> Vec<CheckedRecording> {

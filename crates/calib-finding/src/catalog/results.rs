@@ -148,6 +148,15 @@ super::topic! {
             "Marker `{marker}` of body `{body}` scatters by {sigma} per coordinate, the other markers by {others}: left-out poses are predicted better with a noise level of its own.",
             "Check the marker if it scatters more than the others: it may be loose, damaged, or partly hidden from the cameras.";
     }
+    /// The noise that the profile states is not that of the markers about their bodies.
+    NOISE_STATED = "noise-stated" {
+        "above": Warning,
+            "The markers of body `{body}` scatter by {sigma} about it, {ratio} times the noise that the profile states ({stated}).",
+            "Check the unit: `marker_sigma_mm` is in millimeters, of one coordinate. Otherwise look for loose or reflecting markers, or leave the key out: the fit then estimates the noise.";
+        "below": Warning,
+            "The markers of body `{body}` scatter by {sigma} about it; the profile states {stated}, {ratio} times as much.",
+            "Check the unit: `marker_sigma_mm` is in millimeters, of one coordinate. Positions that a tracker fitted to a rigid body do not scatter about it: declare such a body with `pose: true`.";
+    }
     /// Noise of markers by the cameras of the profile.
     CAMERA_NOISE = "camera-noise" {
         "taken": Info,
