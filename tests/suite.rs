@@ -2,6 +2,7 @@
 //! One subject: `cargo test -p calib-cli --test suite shown::`.
 
 mod apply;
+mod apply_shared;
 mod bad_input;
 mod blank_readings;
 mod blind;

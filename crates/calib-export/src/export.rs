@@ -145,7 +145,7 @@ impl Asked<'_> {
                 seen = Some(self.held_out.iter().map(at).collect::<Vec<_>>());
                 if let Some((one, other, meters)) = dh::far(&alone, &self.chain, &table) {
                     notes.push(format!(
-                        "The axes of {one} and {other} are nearly parallel: their common normal is {meters:.0} m away, and small errors move it by meters. The numbers are exact together; in `--to hayati` none is far."
+                        "The axes of {one} and {other} are nearly parallel: their common normal is {meters:.0} m away, and small errors move it by meters. The numbers are exact together. `--to hayati` has none of this size."
                     ));
                 }
                 yaml::dh(&self.head(&notes), &table, hayati)

@@ -15,7 +15,7 @@ use std::ops::Range;
 use nalgebra::{Isometry3, Matrix2, Point3, SMatrix, Vector2, Vector3};
 
 use super::offset::{BLOCKS, ClockMap, OF_BLOCKS, OffsetOutcome, OffsetSettings};
-use super::rigid::{Regressors, Rigid, SIZE, about_mean, as_rigid};
+use super::rigid::{Regressors, Rigid, SIZE, about_mean, as_rigid, ridged_inverse};
 use crate::statistics::median;
 
 /// Positions at times of one clock; lost samples are left out.
@@ -54,8 +54,6 @@ const UNSURE: f64 = 0.01;
 const MAX_GAP: f64 = 5.0;
 /// Half of the time of difference quotients, s.
 const HALF: f64 = 0.02;
-/// Added to the normal equations of scaled columns: motions of few joints leave columns that depend on each other.
-const RIDGE: f64 = 1e-9;
 /// Steps of Gauss-Newton; four are usual.
 const MAX_STEPS: usize = 20;
 
@@ -157,14 +155,8 @@ impl Projection {
         for x in &rows {
             normal += x * x.transpose();
         }
-        let scale = normal
-            .diagonal()
-            .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
-        let scale = SMatrix::<f64, SIZE, SIZE>::from_diagonal(&scale);
-        let ridge = SMatrix::<f64, SIZE, SIZE>::identity() * RIDGE;
-        let inverse = (scale * normal * scale + ridge).try_inverse()?;
         Some(Self {
-            inverse: scale * inverse * scale,
+            inverse: ridged_inverse(&normal)?,
             rows,
         })
     }
@@ -268,7 +260,9 @@ pub fn clock_offset_of_point(
     let (offset, left) = minima[0];
     let second = minima.get(1);
     let ratio = second.map_or(0.0, |m| correlation(m.1) / correlation(left));
-    if let Some(second) = second.filter(|m| asked > 1 && m.1 < CLEARLY * left) {
+    // A robot that is not the URDF's moves like neither.
+    let alike = |m: &&(f64, f64)| asked > 1 && (m.1 < CLEARLY * left || left > MAX_LEFT);
+    if let Some(second) = second.filter(alike) {
         return OffsetOutcome::Ambiguous {
             first: offset,
             second: second.0,

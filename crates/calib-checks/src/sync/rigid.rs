@@ -17,7 +17,7 @@ const CHANGES: usize = 9;
 /// R₀, m and t₀ for samples, and what their changes explain.
 pub(super) struct Rigid {
     tracker_from_root: Isometry3<f64>,
-    /// m, m.
+    /// m: the marker's place on its link, m.
     marker: Vector3<f64>,
     /// R₀ (t + R m) + t₀ of each sample, m.
     places: Vec<Vector3<f64>>,
@@ -56,20 +56,13 @@ impl Rigid {
             places.push(arm + tracker_from_root.translation.vector);
             columns.push(column);
         }
-        /// Of scaled columns: a robot that does not turn leaves m open.
-        const RIDGE: f64 = 1e-9;
-        let scale = normal
-            .diagonal()
-            .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
-        let scale = SMatrix::<f64, CHANGES, CHANGES>::from_diagonal(&scale);
-        let ridge = SMatrix::<f64, CHANGES, CHANGES>::identity() * RIDGE;
-        let inverse = (scale * normal * scale + ridge).try_inverse()?;
+        let inverse = ridged_inverse(&normal)?;
         Some(Self {
             tracker_from_root,
             marker,
             places,
             columns,
-            inverse: scale * inverse * scale,
+            inverse,
         })
     }
 
@@ -123,6 +116,21 @@ pub(super) fn as_rigid(
         .collect();
     all.sort_by(|a, b| a.1.total_cmp(&b.1));
     all
+}
+
+/// Inverse of normal equations whose columns may depend on each other, as motions of few joints leave them.
+pub(super) fn ridged_inverse<const N: usize>(
+    normal: &SMatrix<f64, N, N>,
+) -> Option<SMatrix<f64, N, N>> {
+    /// Added to the diagonal of scaled columns.
+    const RIDGE: f64 = 1e-9;
+    let scale = normal
+        .diagonal()
+        .map(|d| if d > 0.0 { 1.0 / d.sqrt() } else { 0.0 });
+    let scale = SMatrix::<f64, N, N>::from_diagonal(&scale);
+    let ridge = SMatrix::<f64, N, N>::identity() * RIDGE;
+    let inverse = (scale * normal * scale + ridge).try_inverse()?;
+    Some(scale * inverse * scale)
 }
 
 /// The pose whose numbers are x of equation (1).

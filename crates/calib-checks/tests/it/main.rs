@@ -2,6 +2,7 @@
 
 mod bodies;
 mod checks;
+mod flips;
 mod jumps;
 mod likelihood;
 mod real_tables;

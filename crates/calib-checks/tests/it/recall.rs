@@ -1,6 +1,7 @@
 //! How many injected faults are found, and how many clean recordings are called faulty: the table of the book.
 
-use crate::checks::{FLIPPED, Recorded, faults, forward, record, recorded_q};
+use crate::checks::{Recorded, faults, forward, record, recorded_q};
+use crate::flips::FLIPPED;
 use calib_checks::model::{spoiled_rows, up_axis};
 use calib_checks::{checks, held_out_in_training, other_scales};
 use calib_finding::Id;

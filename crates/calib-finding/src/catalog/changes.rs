@@ -79,8 +79,8 @@ super::topic! {
     /// Nothing of the joints is free although they are not as the URDF says.
     JOINTS_HELD = "joints-held" {
         "": Warning,
-            "Nothing of the joints is free. The fitted recordings are off by {none} rms, and by {best} with the offsets and axes of the joints free: the robot is not as its URDF says.",
-            "To calibrate the robot, add `joint_offsets` and `joint_axes` to `solve: {free: …}`. If it was to be verified as it is, the errors in the report are those of its URDF.";
+            "The profile estimates no parameter of a joint. The residuals of the fitted recordings are {none} rms, and {best} if the offsets and axes of the joints are estimated: the robot is not as its URDF says.",
+            "To calibrate the robot, add `joint_offsets` and `joint_axes` to `solve: {free: …}`. To verify the URDF as it is, nothing needs to be changed: the errors in the report are its errors.";
     }
     /// A joint stops off its readings by more than the others.
     JOINT_SCATTERS = "joint-scatters" {

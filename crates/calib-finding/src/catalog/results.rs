@@ -136,7 +136,7 @@ super::topic! {
             "Joint `{joint}` follows `{source}` by {ratio} ± {sigma}, if that is estimated; the URDF states {stated}. The {quantity} is then {value} ± {value_sigma}, not {before}.",
             "Correct `multiplier` in the URDF by the mechanism, or estimate it: `solve: {joints: {{joint}: {free: [offset, axis, gain]}}, prior: {gain_percent: 25}}`.";
         "alone": Warning,
-            "Joint `{joint}` follows `{source}` by {ratio} ± {sigma}, if that is estimated; the URDF states {stated}. Over the recorded range that makes {size}.",
+            "Joint `{joint}` follows `{source}` by {ratio} ± {sigma}, if that is estimated; the URDF states {stated}. Over the recorded range the difference amounts to {size}.",
             "Correct `multiplier` in the URDF by the mechanism, or estimate it: `solve: {joints: {{joint}: {free: [offset, axis, gain]}}, prior: {gain_percent: 25}}`.";
         "taken": Info,
             "The {quantity} is known to {before_sigma} only if `{joint}` follows `{source}` by exactly {stated}, as the URDF states. With that estimated, {ratio} ± {sigma}, it is {value} ± {value_sigma}.",

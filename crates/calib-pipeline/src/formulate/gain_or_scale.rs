@@ -47,16 +47,8 @@ pub(crate) fn findings(inputs: &Inputs, fit: &MlFit) -> Option<Finding> {
     }
     let model = &inputs.robot.model;
     let law = model.joint(model.joint_id(&best.joint).ok()?).law;
-    let rows = inputs
-        .recordings
-        .values()
-        .flat_map(|loaded| loaded.q.iter().flatten());
-    let values = rows.map(|q| law.multiplier * q[law.source.index()]);
-    let values = values.filter(|q| q.is_finite());
-    let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), q| {
-        (low.min(q), high.max(q))
-    });
-    let moves = (best.value * (high - low)).abs();
+    let (low, high) = inputs.range(law.source)?;
+    let moves = (best.value * law.multiplier * (high - low)).abs();
     (moves > MOVES).then(|| {
         Finding::new(catalog::GAIN_OR_SCALE, Subject::joint(&best.joint))
             .with("joint", Fact::name(best.joint.clone()))

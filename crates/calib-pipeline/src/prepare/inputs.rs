@@ -7,7 +7,7 @@ use std::sync::Arc;
 use calib_finding::Finding;
 use calib_profile::{BodyKind, Profile, RecordingSpec};
 use calib_recording::{Meta, Poses};
-use calib_urdf::RobotModel;
+use calib_urdf::{JointId, RobotModel};
 use nalgebra::Matrix3;
 
 use crate::prepare::aligned::Alignment;
@@ -89,6 +89,20 @@ pub struct Loaded {
     pub mixed: BTreeMap<String, Vec<Option<Mixed>>>,
 }
 
+/// Smallest and largest position of a joint in these rows.
+pub(crate) fn range<'a>(
+    rows: impl Iterator<Item = &'a Vec<f64>>,
+    joint: JointId,
+) -> Option<(f64, f64)> {
+    let positions = rows.map(|q| q[joint.index()]);
+    positions
+        .filter(|q| q.is_finite())
+        .fold(None, |range, q| match range {
+            None => Some((q, q)),
+            Some((low, high)) => Some((q.min(low), q.max(high))),
+        })
+}
+
 /// Everything the estimation needs.
 #[derive(Debug, Clone)]
 pub struct Inputs {
@@ -111,6 +125,13 @@ pub struct Inputs {
 }
 
 impl Inputs {
+    /// Smallest and largest position of a joint that moves on its own, over all recordings, rad or m; `None` where none is known.
+    #[must_use]
+    pub fn range(&self, joint: JointId) -> Option<(f64, f64)> {
+        let rows = self.recordings.values();
+        range(rows.flat_map(|loaded| loaded.q.iter().flatten()), joint)
+    }
+
     /// Takes bodies and markers of single rows out, as if the tracker had lost them, and remembers why.
     pub fn exclude(&mut self, excluded: Vec<Excluded>) {
         for out in &excluded {

@@ -136,20 +136,12 @@ fn alone(inputs: &Inputs, joint: JointId, freed: &MlFit) -> Option<Finding> {
     let mimic = joint.mimic?;
     let gain = gain_of(&freed.solution.parameters, &joint.name)?;
     let sigma = gain.sigma?;
-    let source = mimic.joint.index();
-    let read = inputs
-        .recordings
-        .values()
-        .flat_map(|r| r.q.iter().flatten());
-    let range = read.map(|q| q[source]).filter(|q| q.is_finite());
-    let (low, high) = range.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| {
-        (l.min(q), h.max(q))
-    });
+    let (low, high) = inputs.range(joint.law.source)?;
     let (least, unit) = match joint.kind.turns() {
         true => (MATTERS.1, Unit::Radian),
         false => (MATTERS.0, Unit::Meter),
     };
-    let size = (gain.value * mimic.multiplier * (high - low)).abs();
+    let size = (gain.value * joint.law.multiplier * (high - low)).abs();
     if !(gain.value.abs() > REFUTED * sigma && size > least) {
         return None;
     }

@@ -4,7 +4,7 @@ use calib_profile::Usage;
 use calib_report::UnseenBody;
 use calib_urdf::JointId;
 
-use crate::prepare::inputs::{Inputs, Loaded};
+use crate::prepare::inputs::{self, Inputs, Loaded};
 use crate::prepare::slides::scales;
 use crate::verify::unseen::Shown;
 
@@ -84,7 +84,7 @@ pub(crate) fn motions(inputs: &Inputs, joint_sigma: f64) -> Motions {
             rows.filter(|(row, _)| shown.follows(loaded, *row, *joint))
                 .filter_map(|(_, q)| q.as_ref())
         });
-        let verified = range_of(rows, *joint).map_or(0.0, |(l, h)| h - l);
+        let verified = inputs::range(rows, *joint).map_or(0.0, |(l, h)| h - l);
         verified < VERIFIED * (high - low) && !is_named(joint)
     });
     let still = still.map(|(joint, _)| model.joint(*joint).name.clone());
@@ -115,17 +115,7 @@ fn rows<'a>(recordings: &[&'a Loaded]) -> Vec<&'a Vec<f64>> {
 
 /// Smallest and largest position of a joint, where any is known.
 fn range(recordings: &[&Loaded], joint: JointId) -> Option<(f64, f64)> {
-    range_of(rows(recordings).into_iter(), joint)
-}
-
-fn range_of<'a>(rows: impl Iterator<Item = &'a Vec<f64>>, joint: JointId) -> Option<(f64, f64)> {
-    let positions = rows.map(|q| q[joint.index()]);
-    positions
-        .filter(|q| q.is_finite())
-        .fold(None, |range, q| match range {
-            None => Some((q, q)),
-            Some((low, high)) => Some((q.min(low), q.max(high))),
-        })
+    inputs::range(rows(recordings).into_iter(), joint)
 }
 
 /// Share of the rows in which two joints are away from where they usually are in their recording.

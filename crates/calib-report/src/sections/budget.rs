@@ -50,7 +50,7 @@ pub(super) fn budget(page: &mut Page, report: &Report) {
     page.table(&caption(report), table);
     page.text(match report.verdict {
         Verdict::Accepted | Verdict::AcceptedWithWarnings => "For a certificate:",
-        _ => "In short, of a result that is not accepted and certifies nothing:",
+        _ => "The result is not accepted; these numbers are not for a certificate:",
     });
     page.code("text", &certificate(report, &budget));
     page.text(coverage(&budget));

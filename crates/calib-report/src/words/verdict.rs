@@ -361,20 +361,13 @@ fn of_prediction(reason: &Reason, v: &Values<'_>) -> String {
 fn body_not_verified(v: &Values<'_>) -> String {
     let body = code(v.name("body"));
     match v.get("joints") {
-        Some(Fact::Names(joints)) => format!(
-            "No held-out pose shows {body}: neither its mount nor {} verified.",
-            match &joints[..] {
-                [joint] => format!("{} is", code(joint)),
-                _ => format!(
-                    "{} are",
-                    joints
-                        .iter()
-                        .map(|j| code(j))
-                        .collect::<Vec<_>>()
-                        .join(", ")
-                ),
-            }
-        ),
+        Some(Fact::Names(joints)) => {
+            let joints: Vec<String> = joints.iter().map(|joint| code(joint)).collect();
+            format!(
+                "No held-out pose shows {body}: neither its mount nor the calibration of {} is verified.",
+                joints.join(", ")
+            )
+        }
         _ => format!("No held-out pose shows {body}: its mount is not verified."),
     }
 }

@@ -92,15 +92,8 @@ fn moves(inputs: &Inputs, bodies: &BTreeSet<&str>) -> bool {
     });
     let above: BTreeSet<JointId> = above.collect();
     let moved = above.into_iter().filter(|joint| {
-        let rows = inputs
-            .recordings
-            .values()
-            .flat_map(|r| r.q.iter().flatten());
-        let places = rows.map(|q| q[joint.index()]).filter(|q| q.is_finite());
-        let (low, high) = places.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), q| {
-            (l.min(q), h.max(q))
-        });
-        high - low > MOVED
+        let range = inputs.range(*joint);
+        range.is_some_and(|(low, high)| high - low > MOVED)
     });
     moved.count() >= JOINTS
 }
