@@ -86,13 +86,16 @@ pub fn lagging(late: impl Fn(&str) -> f64) -> Scratch {
     Scratch::new().brief("ripley").file(POSES, fitted)
 }
 
-/// The same with the checks from a motion, too, and with `timing`: the fit estimates by how much all joints are late. What is `stated` of one joint, ms,
+/// The same with the checks from a motion, too, and with `timing`: the fit estimates by how much all joints are late. What is `stated` of joints, ms,
 /// is in the profile.
-fn continuous(late: impl Fn(&str) -> f64, stated: Option<(&str, f64)>) -> Scratch {
+fn continuous(late: impl Fn(&str) -> f64, stated: &[(&str, f64)]) -> Scratch {
     let [fitted, held_out] = motion(late);
-    let stated = stated.map_or_else(String::new, |(joint, ms)| {
-        format!(", late_ms: {{{joint}: {ms:.1}}}")
-    });
+    let of_joints = stated.iter().map(|(joint, ms)| format!("{joint}: {ms:.1}"));
+    let of_joints: Vec<String> = of_joints.collect();
+    let stated = match of_joints.join(", ") {
+        none if none.is_empty() => none,
+        joints => format!(", late_ms: {{{joints}}}"),
+    };
     let timing = format!("timing: {{poses: continuous{stated}}}}}");
     let with = |spec: &str| spec.replace('}', &format!(", {timing}"));
     let dir = Scratch::new().brief("ripley");
@@ -141,7 +144,7 @@ fn a_joint_whose_values_are_late_is_named_with_its_time_and_stating_it_mends_the
     }
     for (joint, late) in [("waist", -0.015), ("wrist_roll", 0.05)] {
         let of = |name: &str| if name == joint { late } else { 0.0 };
-        let (_, report) = run(&continuous(of, None));
+        let (_, report) = run(&continuous(of, &[]));
         // Beside the roll axis the tracker sees little of it.
         let expected = match joint {
             "wrist_roll" => "accepted_with_warnings",
@@ -159,9 +162,34 @@ fn a_joint_whose_values_are_late_is_named_with_its_time_and_stating_it_mends_the
             "{joint}: {diagnosis:?}"
         );
         // As the remedy says.
-        let (ran, report) = run(&continuous(of, Some((joint, ms))));
+        let (ran, report) = run(&continuous(of, &[(joint, ms)]));
         assert_eq!(ran.code, 0, "{joint}: {}", ran.stderr);
         assert!(told(&report).is_none(), "{joint}: {:#}", report["findings"]);
+    }
+}
+
+/// A wrist with a controller of its own, whose log is late or early.
+#[test]
+fn joints_that_are_late_together_are_named_together_and_stating_it_mends_the_result() {
+    if !skipped_tests::thorough() {
+        return;
+    }
+    let wrist = ["wrist_pitch", "wrist_roll"];
+    for late in [0.03, -0.02] {
+        let of = |name: &str| if wrist.contains(&name) { late } else { 0.0 };
+        let (_, report) = run(&continuous(of, &[]));
+        assert_eq!(report["verdict"], "rejected", "{late}");
+        assert_eq!(report["diagnosis"]["evidence"], "clock-lag", "{late}");
+        let named = findings(&report, "clock-lag");
+        let facts = &named.first().expect("named")["facts"];
+        assert_eq!(facts["joints"], serde_json::json!(wrist), "{named:#?}");
+        let ms = 1e3 * facts["late"]["value"].as_f64().expect("s");
+        assert!((ms - 1e3 * late).abs() < 2.0, "{ms}");
+        nothing_else_is_blamed(&report);
+        assert!(findings(&report, "missing-physics").is_empty(), "{late}");
+        let (ran, report) = run(&continuous(of, &wrist.map(|joint| (joint, ms))));
+        assert_eq!(ran.code, 0, "{late}: {}", ran.stdout);
+        assert!(told(&report).is_none(), "{late}: {:#}", report["findings"]);
     }
 }
 
@@ -172,7 +200,7 @@ fn a_time_that_is_stated_too_small_is_completed() {
         return;
     }
     let of = |name: &str| if name == "elbow" { 0.03 } else { 0.0 };
-    let (_, report) = run(&continuous(of, Some(("elbow", 10.0))));
+    let (_, report) = run(&continuous(of, &[("elbow", 10.0)]));
     let (named, ms) = told(&report).expect("named");
     assert_eq!(named, "elbow");
     assert!((ms - 30.0).abs() < 2.0, "{ms}");
@@ -236,7 +264,7 @@ fn joints_that_are_all_late_are_not_called_late_one_by_one() {
     }
     // A tenth of a second and more: the motion of a whole row.
     for late in [0.0, 0.03, 0.12, 0.3] {
-        let (ran, report) = run(&continuous(|_| late, None));
+        let (ran, report) = run(&continuous(|_| late, &[]));
         assert_eq!(ran.code, 0, "{}", ran.stderr);
         assert!(told(&report).is_none(), "{:#}", report["findings"]);
         nothing_else_is_blamed(&report);
@@ -263,7 +291,7 @@ fn repeated(table: &str, times: usize) -> String {
 #[test]
 fn frames_that_a_faster_table_repeats_count_once() {
     for times in [2, 3] {
-        let dir = continuous(|_| 0.0, None);
+        let dir = continuous(|_| 0.0, &[]);
         let [poses, checks] = [POSES, CHECKS].map(|file| repeated(&dir.read(file), times));
         let rows = poses.lines().filter(|l| !l.starts_with('#')).count() - 1;
         let (ran, report) = run(&dir.file(POSES, poses).file(CHECKS, checks));
@@ -282,7 +310,7 @@ fn frames_that_a_faster_table_repeats_count_once() {
 #[test]
 fn late_values_of_a_joint_that_is_not_there_are_refused() {
     let refused = |joint: &str, code: i32| {
-        let dir = continuous(|_| 0.0, Some((joint, 5.0)));
+        let dir = continuous(|_| 0.0, &[(joint, 5.0)]);
         let text = dir.read(POSES).replace("wrist_roll_rad", "note");
         let ran = dir.file(POSES, text).calib(["check", PROFILE]);
         let ran = ran.expect(code);

@@ -71,6 +71,7 @@ mod streams;
 mod structural;
 mod stuck;
 mod studies;
+mod swaying;
 mod sweeps;
 mod thermal;
 mod third_robot;

@@ -2,6 +2,7 @@
 //!
 //! `{key}` stands for a value: a number in the unit that people read, with three significant digits; `{key:um}` for a
 //! number in that unit; `{key:yaml-ms}` for milliseconds as YAML has them, without the unit; `{key} ± {sigma}` for a value with the digits that its standard deviation leaves; `{key:row}` for a count with its noun (`1 row`, `2 rows`);
+//! `{key:each other}` for names as YAML has them, each with the milliseconds of another key;
 //! `{key:size}` and `{key:percent-size}` for a number without its sign, which `{key:more-or-less}`, `{key:ahead-or-behind}` or `{key:faster-or-slower}` says in a word. `[[ … ]]` is left out unless every
 //! value in it is known.
 
@@ -57,8 +58,12 @@ fn filled(template: &str, facts: &Facts) -> (String, bool) {
             continue;
         }
         let (key, form) = inside.split_once(':').unwrap_or((inside, ""));
-        match facts.get(key) {
-            Some(fact) => out += &shown(fact, form),
+        let shown = match form.strip_prefix("each ") {
+            Some(other) => each(facts, key, other),
+            None => facts.get(key).map(|fact| shown(fact, form)),
+        };
+        match shown {
+            Some(text) => out += &text,
             None => {
                 out += UNKNOWN;
                 whole = false;
@@ -98,6 +103,18 @@ fn shown(fact: &Fact, form: &str) -> String {
         }
         Fact::Unknown => UNKNOWN.to_owned(),
     }
+}
+
+/// Names with the milliseconds of another key behind each.
+fn each(facts: &Facts, names: &str, other: &str) -> Option<String> {
+    let (Fact::Names(names), Fact::Number { value, unit }) = (facts.get(names)?, facts.get(other)?)
+    else {
+        return None;
+    };
+    let time = lone(*value, *unit, "yaml-ms");
+    let names = names.iter().map(|name| printable_line(name));
+    let each: Vec<String> = names.map(|name| format!("{name}: {time}")).collect();
+    Some(each.join(", "))
 }
 
 /// A value whose standard deviation follows, `{value} ± {sigma}` or `{value} (± {sigma})`, with the digits that σ leaves, and the
@@ -224,6 +241,10 @@ mod tests {
         assert_eq!(said("{angle}, {angle:rad}"), "−30°, −0.524 rad");
         assert_eq!(said("{rows:row} of {lost:row}"), "1 row of 0 rows");
         assert_eq!(said("{late: {late:yaml-ms}}"), "{late: -12.3}");
+        facts.insert("joints", Fact::names(["j5", "j6"]));
+        let said = |template| fill(template, &facts);
+        assert_eq!(said("{{joints:each late}}"), "{j5: -12.3, j6: -12.3}");
+        assert_eq!(said("a[[: {joints:each none}]]"), "a");
         assert_eq!(
             said("{markers:exchange}; {markers:code}"),
             "a ↔ b; `a`, `b`"

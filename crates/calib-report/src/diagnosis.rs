@@ -223,7 +223,7 @@ fn changed(report: &Report) -> Option<Diagnosis> {
 }
 
 /// Findings that say what made the errors.
-pub(crate) const NAMED_CAUSES: [Id; 8] = [
+pub(crate) const NAMED_CAUSES: [Id; 9] = [
     catalog::TRACKER_SCALE,
     catalog::CHANGED_WHILE_RECORDING,
     catalog::MISSING_PHYSICS,
@@ -232,10 +232,12 @@ pub(crate) const NAMED_CAUSES: [Id; 8] = [
     CAUSES[2],
     CAUSES[3],
     CAUSES[4],
+    CAUSES[5],
 ];
 
 /// Findings that name a cause of errors without a test of the fit, the most likely first.
-const CAUSES: [Id; 5] = [
+const CAUSES: [Id; 6] = [
+    catalog::TRACKER_SWAYS,
     catalog::JOINTS_HELD,
     catalog::CLOCK_LAG,
     catalog::JOINT_GAIN,

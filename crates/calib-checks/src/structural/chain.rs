@@ -195,6 +195,13 @@ impl Chain {
         path
     }
 
+    /// A joint and all that it carries, in the order of the chain.
+    pub(crate) fn carried(&self, joint: JointIndex) -> Vec<JointIndex> {
+        let joints = (0..self.joints.len()).map(JointIndex);
+        let is_carried = |j: &JointIndex| self.path(self.joints[j.0].child).contains(&joint);
+        joints.filter(is_carried).collect()
+    }
+
     /// The readings that move a link.
     pub(crate) fn readings_of(&self, link: LinkIndex) -> Vec<JointIndex> {
         let mut readings: Vec<JointIndex> = self

@@ -1,7 +1,7 @@
 //! Continuous faults (gain, coupling by a fraction, readings that lag behind, of a recording or of a joint) by score tests, and the residual that nominal errors explain.
 //!
 //! The residuals `r = Q y + c − R m − t` are linear in small changes of the registration (Q, c, m: columns A_r), of the nominal
-//! geometry (six per moving joint, with priors: A_g) and of the tested parameter (one column G per gain, per coupling, per recording's lag and per joint's latency):
+//! geometry (six per moving joint, with priors: A_g) and of the tested parameter (one column G per gain, per coupling, per recording's lag, and per latency of a joint or of a joint and what it carries):
 //!
 //! ```text
 //! r ≈ A x + G k + e,   cov e = σ² (I + λ Σ_j D_j D_jᵀ) per row,   D_j = ∂(R m + t)/∂reading_j         joint noise
@@ -44,7 +44,8 @@ const AS_GOOD: f64 = 6.0;
 /// A continuous fault that the data demand.
 #[derive(Debug, Clone, PartialEq, serde::Serialize)]
 pub struct Continuous {
-    /// [`Hypothesis::Gain`], [`Hypothesis::Coupling`], [`Hypothesis::Lag`] or [`Hypothesis::Latency`], with its estimated factor or time.
+    /// [`Hypothesis::Gain`], [`Hypothesis::Coupling`], [`Hypothesis::Lag`], [`Hypothesis::Latency`] or [`Hypothesis::LatencyBeyond`], with its estimated
+    /// factor or time.
     pub hypothesis: Hypothesis,
     /// Standard deviation of the factor, or of the time, s.
     pub sigma: f64,
@@ -60,22 +61,28 @@ pub struct Continuous {
 
 impl Test {
     fn hypothesis(&self, k: f64) -> Hypothesis {
-        match *self {
-            Self::Reading { joint, source } if joint == source => Hypothesis::Gain {
+        match self {
+            &Self::Reading { joint, source } if joint == source => Hypothesis::Gain {
                 joint,
                 factor: 1.0 + k,
             },
-            Self::Reading { joint, source } => Hypothesis::Coupling {
+            &Self::Reading { joint, source } => Hypothesis::Coupling {
                 joint,
                 source,
                 factor: k,
             },
-            Self::Lag { recording } => Hypothesis::Lag {
+            &Self::Lag { recording } => Hypothesis::Lag {
                 recording,
                 seconds: k,
             },
-            Self::Latency { joint } => Hypothesis::Latency { joint, seconds: k },
-            Self::Zero { joint } => Hypothesis::Zero { joint, offset: k },
+            Self::Latency { joints } => {
+                let (joint, seconds) = (joints[0], k);
+                match joints.len() {
+                    1 => Hypothesis::Latency { joint, seconds },
+                    _ => Hypothesis::LatencyBeyond { joint, seconds },
+                }
+            }
+            &Self::Zero { joint } => Hypothesis::Zero { joint, offset: k },
         }
     }
 }
@@ -111,7 +118,9 @@ fn same(a: &Hypothesis, b: &Hypothesis) -> bool {
         let mut h = *h;
         match &mut h {
             Hypothesis::Gain { factor, .. } | Hypothesis::Coupling { factor, .. } => *factor = 0.0,
-            Hypothesis::Lag { seconds, .. } | Hypothesis::Latency { seconds, .. } => *seconds = 0.0,
+            Hypothesis::Lag { seconds, .. }
+            | Hypothesis::Latency { seconds, .. }
+            | Hypothesis::LatencyBeyond { seconds, .. } => *seconds = 0.0,
             _ => {}
         }
         h
@@ -172,14 +181,16 @@ fn left_with(
 }
 
 /// What is significant, once zeros that are off by more than the priors allow, and explain more, are corrected: with the wrong posture the
-/// motion of one joint looks like a part of another's.
+/// motion of one joint looks like a part of another's. So are lags that the fit estimates.
 fn demanded(data: &Data, screened: &[SampleIndex], options: &Options) -> Option<Continuous> {
-    let tests = tests(data);
+    let tests = tests(data, options.clocks_estimated);
     if tests.is_empty() {
         return None;
     }
     let mut corrected = None;
-    for _ in 0..=ZEROS {
+    let lags = tests.iter().filter(|t| matches!(t, Test::Lag { .. }));
+    let lags = lags.filter(|_| options.clocks_estimated).count();
+    for _ in 0..=ZEROS + lags {
         match strongest(
             corrected.as_ref().unwrap_or(data),
             screened,
@@ -187,9 +198,9 @@ fn demanded(data: &Data, screened: &[SampleIndex], options: &Options) -> Option<
             options,
         )? {
             Demanded::Fault(found) => return Some(found),
-            Demanded::Zero(zero) => {
+            Demanded::Beside(hypothesis) => {
                 let all = Scoped {
-                    hypothesis: zero,
+                    hypothesis,
                     scope: Scope::All,
                 };
                 corrected = Some(apply(&all, corrected.as_ref().unwrap_or(data)));
@@ -202,8 +213,8 @@ fn demanded(data: &Data, screened: &[SampleIndex], options: &Options) -> Option<
 /// What explains most.
 enum Demanded {
     Fault(Continuous),
-    /// The zero of a joint: no continuous fault.
-    Zero(Hypothesis),
+    /// The zero of a joint, or the lag of a recording that the fit estimates: no fault, and to be corrected before one is named.
+    Beside(Hypothesis),
 }
 
 fn strongest(
@@ -227,8 +238,13 @@ fn strongest(
     let (zeros, mut scored): (Vec<_>, Vec<_>) = score_tests(&model, &sums, &map)
         .into_iter()
         .partition(|s| is_zero(s.0));
+    if options.clocks_estimated {
+        beside_others(&mut scored, tests, &map);
+    }
     scored.sort_by(|a, b| b.1.total_cmp(&a.1));
-    whole_recording_first(tests, &mut scored);
+    if !options.clocks_estimated {
+        whole_recording_first(tests, &mut scored);
+    }
     let &(which, statistic, factor, h) = scored.first()?;
     if map.freedom < LEAST_FREEDOM {
         return None;
@@ -239,7 +255,7 @@ fn strongest(
     }
     let zero = zeros.into_iter().max_by(|a, b| a.1.total_cmp(&b.1));
     if let Some((joint, _, offset, _)) = zero.filter(|zero| zero.1 > statistic) {
-        return Some(Demanded::Zero(tests[joint].hypothesis(offset)));
+        return Some(Demanded::Beside(tests[joint].hypothesis(offset)));
     }
     let cross = plain.cross.view((0, which), (model.registration, 1));
     let own = DMatrix::from_element(1, 1, plain.own[which]);
@@ -249,6 +265,9 @@ fn strongest(
         return None;
     }
     let as_good = |s: &&(usize, f64, f64, f64)| statistic - s.1 < AS_GOOD;
+    if options.clocks_estimated && matches!(tests[which], Test::Lag { .. }) {
+        return Some(Demanded::Beside(tests[which].hypothesis(factor)));
+    }
     let alternatives = scored[1..].iter().take_while(as_good);
     Some(Demanded::Fault(Continuous {
         hypothesis: tests[which].hypothesis(factor),
@@ -260,22 +279,55 @@ fn strongest(
     }))
 }
 
-/// Of a joint that is late and a recording that is late as a whole, the second is more common: the first must explain more.
+/// Of joints that are late and a recording that is late as a whole, the second is more common: the first must explain more.
 fn whole_recording_first(tests: &[Test], scored: &mut [(usize, f64, f64, f64)]) {
-    let best = scored.first().map(|s| (tests[s.0], s.1));
+    let best = scored.first().map(|s| (&tests[s.0], s.1));
     let Some((Test::Latency { .. }, statistic)) = best else {
         return;
     };
     let as_good = scored.iter().take_while(|s| statistic - s.1 < AS_GOOD);
     let of_recording = as_good
-        .map(|s| tests[s.0])
+        .map(|s| &tests[s.0])
         .position(|test| matches!(test, Test::Lag { .. }));
     if let Some(place) = of_recording {
         scored[..=place].rotate_right(1);
     }
 }
 
-fn tests(data: &Data) -> Vec<Test> {
+/// Where the fit estimates the clocks, each latency in comparison with the other joints: of k₁ of its joints and k₂ of the others
+///
+/// ```text
+/// k₁ − k₂ = [1 −1] H⁻¹ g,   h = 1/([1 −1] H⁻¹ [1 −1]ᵀ),   T = ν ln(χ²_b/(χ²_b − (k₁ − k₂)² h)),   H₁₂ = (h_b − h₁ − h₂)/2
+/// ```
+///
+/// with h_b and χ²_b of both together. Those of the others and of both are no tests of their own.
+fn beside_others(scored: &mut Vec<(usize, f64, f64, f64)>, tests: &[Test], map: &Map) {
+    let is_late = |s: &(usize, f64, f64, f64)| matches!(tests[s.0], Test::Latency { .. });
+    let late: Vec<_> = scored.iter().copied().filter(is_late).collect();
+    scored.retain(|s| !is_late(s));
+    let Some((&(_, _, common, both), groups)) = late.split_first() else {
+        return;
+    };
+    let chi2 = map.chi2 - common * common * both;
+    for pair in groups.chunks_exact(2) {
+        let [(test, _, own, h1), (_, _, rest, h2)] = [pair[0], pair[1]];
+        let cross = 0.5 * (both - h1 - h2);
+        let determinant = h1 * h2 - cross * cross;
+        let h = determinant / both;
+        // Columns that the geometry explains altogether test nothing.
+        if !(h.is_finite() && h > 1e-9 * h1.max(h2) && chi2 > 0.0) {
+            continue;
+        }
+        // g = −k h of each alone
+        let (g1, g2) = (-own * h1, -rest * h2);
+        let seconds = ((h1 + cross) * g2 - (h2 + cross) * g1) / determinant;
+        let explained = (seconds * seconds * h).min(chi2 * (1.0 - 1e-12));
+        let statistic = map.freedom * (chi2 / (chi2 - explained)).ln();
+        scored.push((test, statistic, seconds, h));
+    }
+}
+
+fn tests(data: &Data, clocks_estimated: bool) -> Vec<Test> {
     let joints = data.relevant_joints();
     let mut tests = Vec::new();
     for &joint in &joints {
@@ -287,18 +339,36 @@ fn tests(data: &Data) -> Vec<Test> {
     let timed: BTreeSet<RecordingIndex> = known
         .filter_map(|(recording, rates)| rates.as_ref().map(|_| *recording))
         .collect();
-    let moves = |joint: &JointIndex| {
-        let mut rates = data.rates.iter().flatten();
-        rates.any(|of_row| of_row.get(joint.0).is_some_and(|rate| *rate != 0.0))
-    };
-    tests.extend(joints.iter().map(|joint| Test::Zero { joint: *joint }));
-    let moving: Vec<JointIndex> = joints.into_iter().filter(moves).collect();
+    tests.extend(joints.into_iter().map(|joint| Test::Zero { joint }));
+    let moving = data.moving_joints();
     tests.extend(timed.into_iter().map(|recording| Test::Lag { recording }));
     // Of one joint that moves it is the lag of the recording.
     if moving.len() > 1 {
-        tests.extend(moving.into_iter().map(|joint| Test::Latency { joint }));
+        tests.extend(late(data, &moving, clocks_estimated));
     }
     tests
+}
+
+/// Each joint alone, and each with those that it carries: a wrist, an arm or a hand with a controller of its own.
+/// Where the clocks are estimated, all together first, and the others behind each.
+fn late(data: &Data, moving: &[JointIndex], clocks_estimated: bool) -> Vec<Test> {
+    let mut groups: Vec<Vec<JointIndex>> = moving.iter().map(|joint| vec![*joint]).collect();
+    let together = moving.iter().map(|joint| data.moving_with(*joint));
+    groups.extend(together.filter(|group| group.len() > 1 && group.len() < moving.len()));
+    if clocks_estimated {
+        let mut with_others = vec![moving.to_vec()];
+        for group in groups {
+            let others = moving.iter().filter(|joint| !group.contains(joint));
+            let others: Vec<JointIndex> = others.copied().collect();
+            // The same test with the other sign.
+            if !with_others.contains(&others) {
+                with_others.extend([group, others]);
+            }
+        }
+        groups = with_others;
+    }
+    let late = groups.into_iter();
+    late.map(|joints| Test::Latency { joints }).collect()
 }
 
 /// (test, T, k̂, h) for every test.

@@ -42,6 +42,11 @@ pub(crate) fn correct(scoped: &Scoped, data: &Data) -> Data {
             let inside = |of, j| scoped.scope.contains(of) && j == joint;
             later(&mut corrected, seconds, inside);
         }
+        Hypothesis::LatencyBeyond { joint, seconds } => {
+            let together = data.moving_with(joint);
+            let inside = |of, j| scoped.scope.contains(of) && together.contains(&j);
+            later(&mut corrected, seconds, inside);
+        }
         Hypothesis::StoodAt { joint, value } => {
             // Where every row has a reading, it is the readings that are wrong.
             let empty = empty_rows(scoped.scope, joint, data);

@@ -170,6 +170,24 @@ impl Data {
         joints
     }
 
+    /// The joints whose readings move a body, and which were read in motion.
+    pub(crate) fn moving_joints(&self) -> Vec<JointIndex> {
+        let moves = |joint: &JointIndex| {
+            let mut rates = self.rates.iter().flatten();
+            rates.any(|of_row| of_row.get(joint.0).is_some_and(|rate| *rate != 0.0))
+        };
+        self.relevant_joints().into_iter().filter(moves).collect()
+    }
+
+    /// A joint and those that it carries which were read in motion; the joint first.
+    #[must_use]
+    pub fn moving_with(&self, joint: JointIndex) -> Vec<JointIndex> {
+        let moving = self.moving_joints();
+        let carried = self.chain.carried(joint).into_iter();
+        let others = carried.filter(|other| *other != joint && moving.contains(other));
+        std::iter::once(joint).chain(others).collect()
+    }
+
     /// The mount of a body in a recording.
     #[must_use]
     pub fn mount(&self, body: BodyIndex, recording: RecordingIndex) -> u32 {

@@ -256,6 +256,13 @@ pub enum Hypothesis {
         /// s; negative where the readings are ahead.
         seconds: f64,
     },
+    /// The readings of a joint and of all that it carries were taken `seconds` before those of the others and the tracker's data of their row.
+    LatencyBeyond {
+        /// The first of them.
+        joint: JointIndex,
+        /// s; negative where the readings are ahead.
+        seconds: f64,
+    },
     /// The joint moved although its column is empty.
     MissingColumn {
         /// Joint.

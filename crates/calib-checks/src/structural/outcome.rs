@@ -41,6 +41,8 @@ pub struct Options {
     pub suspects: Vec<RecordingIndex>,
     /// Test gains and fractional couplings.
     pub score_tests: bool,
+    /// The fit estimates how late the readings of a recording are as a whole: joints are late in comparison with the others.
+    pub clocks_estimated: bool,
 }
 
 impl Default for Options {
@@ -60,6 +62,7 @@ impl Default for Options {
             list_invisible: true,
             suspects: Vec::new(),
             score_tests: true,
+            clocks_estimated: false,
         }
     }
 }

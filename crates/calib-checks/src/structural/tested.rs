@@ -1,7 +1,7 @@
 //! Columns of the score tests: each is a reading times the derivative by a reading, so none is ever written out.
 //!
 //! ```text
-//! G_js = −q_s D_j  of a gain or coupling,   G = −Σ_j q̇_j D_j  of a lag, −q̇_j D_j of a latency, −D_j of a zero     (1)
+//! G_js = −q_s D_j  of a gain or coupling,   G = −Σ_j q̇_j D_j  of a lag, and of a latency over its joints, −D_j of a zero     (1)
 //! Dᵀ V⁻¹ A = (1 + λ DᵀD)⁻¹ Dᵀ A,            V = 1 + λ D Dᵀ                                            (2)
 //! ```
 //!
@@ -13,7 +13,7 @@ use super::ids::{JointIndex, RecordingIndex};
 use super::whitened::JointNoise;
 
 /// One test.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(crate) enum Test {
     /// `reading_joint += k · reading_source`.
     Reading {
@@ -22,8 +22,8 @@ pub(crate) enum Test {
     },
     /// Every reading of the recording as it was k seconds later.
     Lag { recording: RecordingIndex },
-    /// The joint's readings as they were k seconds later.
-    Latency { joint: JointIndex },
+    /// The readings of these joints as they were k seconds later: of one, or of one and those that it carries.
+    Latency { joints: Vec<JointIndex> },
     /// `reading_joint += k`, by more than the prior of the geometry allows.
     Zero { joint: JointIndex },
 }
@@ -64,33 +64,45 @@ impl<'a> TestedSums<'a> {
         let Some(whitened) = noise.whitened(self.lambda) else {
             return;
         };
-        let (with_block, with_itself) = &whitened;
         for (t, test) in self.tests.iter().enumerate() {
             match test {
                 Test::Reading { joint, source } => {
                     self.add_joint(t, *joint, -instant.readings[source.0], noise, &whitened);
                 }
                 Test::Zero { joint } => self.add_joint(t, *joint, -1.0, noise, &whitened),
-                Test::Latency { joint } => {
-                    let rate = instant.rates.and_then(|rates| rates.get(joint.0));
-                    let by = -rate.copied().unwrap_or(0.0);
-                    self.add_joint(t, *joint, by, noise, &whitened);
+                Test::Latency { joints } => {
+                    self.add_later(t, instant, noise, &whitened, |j| {
+                        joints.contains(&JointIndex(j))
+                    });
                 }
                 Test::Lag { recording } if instant.recording == *recording => {
-                    let Some(rates) = instant.rates else {
-                        continue;
-                    };
-                    let rates = noise
-                        .joints()
-                        .map(|j| -rates.get(j).copied().unwrap_or(0.0));
-                    let rates = DVector::from_iterator(with_itself.nrows(), rates);
-                    let column = with_block * &rates;
-                    self.cross.column_mut(t).axpy(1.0, &column, 1.0);
-                    self.own[t] += rates.dot(&(with_itself * &rates));
+                    self.add_later(t, instant, noise, &whitened, |_| true);
                 }
                 Test::Lag { .. } => {}
             }
         }
+    }
+
+    /// Adds the column of test `t`: what moves where the readings that are `late` were later.
+    fn add_later(
+        &mut self,
+        t: usize,
+        instant: &Instant<'_>,
+        noise: &JointNoise,
+        (with_block, with_itself): &(DMatrix<f64>, DMatrix<f64>),
+        late: impl Fn(usize) -> bool,
+    ) {
+        let Some(rates) = instant.rates else {
+            return;
+        };
+        let rate = |j: usize| match late(j) {
+            true => -rates.get(j).copied().unwrap_or(0.0),
+            false => 0.0,
+        };
+        let rates = DVector::from_iterator(with_itself.nrows(), noise.joints().map(rate));
+        let column = with_block * &rates;
+        self.cross.column_mut(t).axpy(1.0, &column, 1.0);
+        self.own[t] += rates.dot(&(with_itself * &rates));
     }
 
     /// Adds the column of test `t`: `by` times the derivative by the joint's reading.
@@ -126,8 +138,11 @@ mod tests {
         let recordings = [RecordingIndex(0), RecordingIndex(1)];
         tests.extend(recordings.map(|recording| Test::Lag { recording }));
         tests.extend((0..joints).map(|j| Test::Latency {
-            joint: JointIndex(j),
+            joints: vec![JointIndex(j)],
         }));
+        tests.push(Test::Latency {
+            joints: vec![JointIndex(1), JointIndex(2)],
+        });
         tests.extend((0..joints).map(|j| Test::Zero {
             joint: JointIndex(j),
         }));
@@ -155,7 +170,10 @@ mod tests {
                         Test::Lag { recording } if recording.0 == n % 2 && n != 4 => {
                             &d * -DVector::from_column_slice(&rates)
                         }
-                        Test::Latency { joint } if n != 4 => d.column(joint.0) * -rates[joint.0],
+                        Test::Latency { joints } if n != 4 => {
+                            let own = joints.iter().map(|j| d.column(j.0) * -rates[j.0]);
+                            own.fold(DVector::zeros(rows), |sum, own| sum + own)
+                        }
                         Test::Zero { joint } => -d.column(joint.0),
                         Test::Lag { .. } | Test::Latency { .. } => DVector::zeros(rows),
                     };

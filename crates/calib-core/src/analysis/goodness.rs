@@ -147,11 +147,17 @@ pub(crate) struct Candidate {
 impl Candidate {
     /// An effect of one joint by its regressor per sample.
     pub(crate) fn of_joint(joint: EdgeId, kind: EffectKind, values: Vec<f64>) -> Self {
+        Self::of_joints(kind, vec![(joint, values)])
+    }
+
+    /// An effect of joints together, with one coefficient.
+    pub(crate) fn of_joints(kind: EffectKind, joints: Vec<(EdgeId, Vec<f64>)>) -> Self {
+        let part = |(joint, values): (EdgeId, _)| (joint.index(), kind.drives(), values);
         Self {
             name: String::new(),
             joint: None,
             physics: Physics::Effect(kind),
-            effect: Effect::Joints(vec![(joint.index(), kind.drives(), values)]),
+            effect: Effect::Joints(joints.into_iter().map(part).collect()),
             tries: 1.0,
         }
     }

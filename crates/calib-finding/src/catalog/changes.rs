@@ -76,6 +76,12 @@ super::topic! {
             "Lengths in this recording are {scale:percent} (± {sigma:percent}) longer than in `{other}` (negative: shorter), alike for all bodies.",
             "Record again without calibrating the tracker in between, or leave the recording out. If its file was written with another scale, export it again.";
     }
+    /// A body that no joint moves moves in the tracker's frame, and the others with it.
+    TRACKER_SWAYS = "tracker-sways" {
+        "": Warning,
+            "Body `{body}`, which no joint moves, moves by {motion} rms from row to row in the tracker's frame, and the other bodies move with it: the tracker, or what the robot stands on, does not stand still. This explains {explains:percent} of their squared residuals.",
+            "Fasten the tracker and the robot's stand, and record again. Where the tracker must move, let its program report all coordinates in the frame of `{body}`; the noise of that frame then moves the other bodies, more the farther away they are.";
+    }
     /// Nothing of the joints is free although they are not as the URDF says.
     JOINTS_HELD = "joints-held" {
         "": Warning,

@@ -13,7 +13,6 @@ use crate::prepare::inputs::{Inputs, Loaded};
 
 /// Offers the latency of every joint to the test for missing physics; where one joint alone moves it is the offset of the clock.
 pub(super) fn add_latencies(formulation: &mut Formulation, inputs: &Inputs) {
-    let timed = |name: &str| inputs.recordings.get(name).map(|loaded| &loaded.velocities);
     let moves = |speed: &Option<f64>| speed.is_some_and(|speed| speed != 0.0);
     let fitted = || {
         let all = inputs.recordings.values();
@@ -29,15 +28,21 @@ pub(super) fn add_latencies(formulation: &mut Formulation, inputs: &Inputs) {
         let Some(edge) = id.and_then(|id| formulation.joints[id.index()]) else {
             continue;
         };
-        let speed = |(recording, row): &(String, usize)| -> f64 {
-            let speeds = timed(recording).and_then(|of| of.get(*joint));
-            let speed = speeds.and_then(|speeds| speeds.get(*row).copied().flatten());
-            speed.unwrap_or(0.0)
-        };
-        let speeds: Vec<f64> = formulation.samples.iter().map(speed).collect();
+        let speeds = speeds(inputs, formulation, joint);
         let problem = &mut formulation.problem;
         problem.candidate(edge, EffectKind::Latency, speeds);
     }
+}
+
+/// The speed of a joint in every sample; 0 where it is not known.
+pub(crate) fn speeds(inputs: &Inputs, formulation: &Formulation, joint: &str) -> Vec<f64> {
+    let speed = |(recording, row): &(String, usize)| -> f64 {
+        let loaded = inputs.recordings.get(recording);
+        let speeds = loaded.and_then(|loaded| loaded.velocities.get(joint));
+        let speed = speeds.and_then(|speeds| speeds.get(*row).copied().flatten());
+        speed.unwrap_or(0.0)
+    };
+    formulation.samples.iter().map(speed).collect()
 }
 
 /// A finding with a joint whose values are later by `seconds` than was stated, and with what is to be stated instead.
@@ -47,17 +52,36 @@ pub(crate) fn with_late_joint(
     joint: &str,
     seconds: f64,
 ) -> Finding {
-    let id = inputs.robot.model.joint_id(joint).ok();
-    let timings = inputs
-        .recordings
-        .values()
-        .filter_map(|r| r.spec.timing.as_ref());
-    let mut stated = timings.filter_map(|timing| timing.late.get(&id?).copied());
-    let stated = stated.next();
+    let stated = stated(inputs, joint);
     finding
         .with("joint", Fact::name(joint))
         .with("late", Fact::seconds(stated.unwrap_or(0.0) + seconds))
         .with_some("stated", stated.map(Fact::seconds))
+}
+
+/// The same of joints that are late together; without what is to be stated where the profile states different times for them.
+pub(crate) fn with_late_joints(
+    finding: Finding,
+    inputs: &Inputs,
+    joints: &[&str],
+    seconds: f64,
+) -> Finding {
+    let first = joints.first().map(|joint| stated(inputs, joint));
+    let alike = joints.iter().all(|j| Some(stated(inputs, j)) == first);
+    let stated = first.filter(|_| alike);
+    let late = stated.map(|stated| stated.unwrap_or(0.0) + seconds);
+    finding
+        .with("joints", Fact::names(joints.iter().copied()))
+        .with_some("late", late.map(Fact::seconds))
+        .with_some("stated", stated.flatten().map(Fact::seconds))
+}
+
+/// By how much the profile says that a joint is late, s.
+fn stated(inputs: &Inputs, joint: &str) -> Option<f64> {
+    let id = inputs.robot.model.joint_id(joint).ok()?;
+    let timings = inputs.recordings.values();
+    let mut timings = timings.filter_map(|r| r.spec.timing.as_ref());
+    timings.find_map(|timing| timing.late.get(&id).copied())
 }
 
 /// The only joint that moves in a recording.

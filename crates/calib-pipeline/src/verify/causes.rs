@@ -61,6 +61,14 @@ impl Causes {
         }
     }
 
+    /// Leaves out a change that explains a smaller share of the cost than something else does.
+    pub(crate) fn leave_change_that_explains_less(&mut self, share: f64) {
+        let less = self.changed.as_ref().is_some_and(|c| c.explains < share);
+        if less {
+            (self.change, self.changed) = (None, None);
+        }
+    }
+
     /// Takes out what other causes explain.
     pub fn leave_unexplained(&self, findings: &mut Vec<Finding>) {
         findings.retain(|finding| !self.explained.contains(finding));

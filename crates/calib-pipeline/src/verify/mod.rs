@@ -26,6 +26,7 @@ pub mod robot_changes;
 mod scatter;
 mod seen;
 mod suspects;
+mod sways;
 pub(crate) mod tracker_noise;
 mod tried;
 mod unfreed;
@@ -49,6 +50,7 @@ use crate::verify::closure::close_loops;
 use crate::verify::known::{Known, Number, known_numbers};
 use crate::verify::moved::moved;
 use crate::verify::residuals::residual_rows;
+use crate::verify::sways::sways;
 use crate::verify::unfreed::unfreed;
 
 /// What a solution is worth.
@@ -102,6 +104,10 @@ pub fn verified(
     if let Some(held) = held {
         verified.causes.explained_by_held_joints();
         verified.findings.push(held);
+    }
+    if let Some((sways, share)) = sways(inputs, &verified.residuals) {
+        verified.causes.leave_change_that_explains_less(share);
+        verified.findings.push(sways);
     }
     verified.findings.extend(fit.and_then(not_tested));
     let missing = verified.causes.goodness.as_ref();

@@ -155,10 +155,9 @@ fn end_of_rest(
 impl Jitter {
     fn suspect(&self) -> Suspect<'_> {
         Suspect::Effect {
-            joint: self.joint,
             // Turns the joint by the value.
             kind: EffectKind::Backlash,
-            values: self.values.clone(),
+            joints: vec![(self.joint, self.values.clone())],
         }
     }
 

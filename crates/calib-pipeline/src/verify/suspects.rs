@@ -4,6 +4,7 @@ use calib_core::{EffectKind, GoodnessOfFit, Suspect};
 use calib_finding::{Fact, Finding, catalog};
 
 use crate::formulate::formulation::MlFit;
+use crate::formulate::late::speeds;
 use crate::prepare::inputs::Inputs;
 
 /// Chance of one false cause in so many analyses, as of the tests themselves.
@@ -25,6 +26,11 @@ pub(super) fn suspected_before<'a>(
         let test = goodness.tests.iter().find(|t| t.name == name)?;
         Some((name, Suspect::Tested(&test.name)))
     };
+    if let Some(Fact::Names(joints)) = finding.facts.get("joints")
+        && finding.id == catalog::CLOCK_LAG
+    {
+        return late_together(inputs, fit, joints);
+    }
     match finding.id {
         id if id == catalog::JOINT_GAIN => tested(format!("{}.gain", word("joint")?)),
         id if id == catalog::CLOCK_LAG => tested(match word("joint") {
@@ -41,12 +47,32 @@ pub(super) fn suspected_before<'a>(
                 q.map_or(0.0, |q| model.position(q, other))
             };
             let suspect = Suspect::Effect {
-                joint: fit.formulation.joints[joint.index()]?,
                 kind: EffectKind::Coupling,
-                values: fit.formulation.samples.iter().map(reading).collect(),
+                joints: vec![(
+                    fit.formulation.joints[joint.index()]?,
+                    fit.formulation.samples.iter().map(reading).collect(),
+                )],
             };
             Some((code, suspect))
         }
         _ => None,
     }
+}
+
+/// Joints whose readings are late by one time.
+fn late_together(
+    inputs: &Inputs,
+    fit: &MlFit,
+    joints: &[String],
+) -> Option<(String, Suspect<'static>)> {
+    let column = |joint: &String| {
+        let id = inputs.robot.model.joint_id(joint).ok()?;
+        let edge = fit.formulation.joints[id.index()]?;
+        Some((edge, speeds(inputs, &fit.formulation, joint)))
+    };
+    let suspect = Suspect::Effect {
+        kind: EffectKind::Latency,
+        joints: joints.iter().filter_map(column).collect(),
+    };
+    Some((format!("{}.latency", joints.join("+")), suspect))
 }

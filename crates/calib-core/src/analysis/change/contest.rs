@@ -36,14 +36,12 @@ const IMITATED: f64 = 1e-6;
 pub enum Suspect<'a> {
     /// An effect that [`Solution::goodness_of_fit`] tested, by its name.
     Tested(&'a str),
-    /// An effect of a joint, with its regressor in every sample.
+    /// An effect of a joint, or of several together, with the regressor of each in every sample.
     Effect {
-        /// The joint.
-        joint: EdgeId,
         /// Which.
         kind: EffectKind,
-        /// The regressor.
-        values: Vec<f64>,
+        /// The joints, and the regressor of each.
+        joints: Vec<(EdgeId, Vec<f64>)>,
     },
     /// A change that a scan found.
     Change(&'a Change),
@@ -181,12 +179,8 @@ impl Solution {
                     effects.push(tested.iter().find(|c| c.is_called(name))?.clone());
                     Columns::Effect(effects.len() - 1)
                 }
-                Suspect::Effect {
-                    joint,
-                    kind,
-                    values,
-                } => {
-                    effects.push(Candidate::of_joint(*joint, *kind, values.clone()));
+                Suspect::Effect { kind, joints } => {
+                    effects.push(Candidate::of_joints(*kind, joints.clone()));
                     Columns::Effect(effects.len() - 1)
                 }
             });

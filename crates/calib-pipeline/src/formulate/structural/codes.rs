@@ -86,6 +86,9 @@ fn of_hypothesis(layout: &Layout<'_>, hypothesis: &Hypothesis) -> String {
         Hypothesis::Latency { joint: j, seconds } => {
             format!("latency({}, {:+.1} ms)", joint(j), 1e3 * seconds)
         }
+        Hypothesis::LatencyBeyond { joint: j, seconds } => {
+            format!("latency({} and beyond, {:+.1} ms)", joint(j), 1e3 * seconds)
+        }
         Hypothesis::RowShift { rows } => format!("rows({rows:+})"),
         Hypothesis::MissingColumn { joint: j } => format!("column({})", joint(j)),
         Hypothesis::StoodAt { joint: j, value } => {

@@ -10,6 +10,7 @@ use calib_profile::{BodyKind, Usage};
 use calib_urdf::{JointId, LinkId, RobotModel};
 use nalgebra::{Isometry3, Point3};
 
+use crate::prepare::aligned::ClockUnknowns;
 use crate::prepare::inputs::{Inputs, Loaded};
 use crate::prepare::tracks::BodyTrack;
 
@@ -151,6 +152,27 @@ impl<'a> Layout<'a> {
             Some(false) => (1e3 * value, "mm"),
             _ => (value.to_degrees(), "deg"),
         }
+    }
+
+    /// Whether the fit estimates how late the readings of every recording in motion are.
+    #[must_use]
+    pub fn clocks_are_estimated(&self) -> bool {
+        let timed: BTreeSet<RecordingIndex> = {
+            let rows = self.data.recording.iter().zip(&self.data.rates);
+            let rows = rows.filter(|(_, rates)| rates.is_some());
+            rows.map(|(recording, _)| *recording).collect()
+        };
+        !timed.is_empty()
+            && timed
+                .iter()
+                .all(|recording| self.estimates_clock(*recording))
+    }
+
+    /// Whether the fit estimates how late the readings of a recording are.
+    #[must_use]
+    pub fn estimates_clock(&self, recording: RecordingIndex) -> bool {
+        let alignment = self.recordings[recording.0].alignment.as_ref();
+        alignment.is_some_and(|a| a.unknowns() != ClockUnknowns::None)
     }
 
     /// Whether the fit estimates the zero of a joint that the recordings move.

@@ -9,8 +9,7 @@ use calib_finding::{About, Fact, Finding, Subject, Unit, catalog};
 
 use super::codes;
 use super::layout::Layout;
-use crate::formulate::late::with_late_joint;
-use crate::prepare::aligned::ClockUnknowns;
+use crate::formulate::late::{with_late_joint, with_late_joints};
 use crate::prepare::effects::free_with_gain;
 
 /// Findings beside the decision; `consistent`: nothing but what the fit estimates is named.
@@ -165,21 +164,31 @@ fn continuous_finding(layout: &Layout<'_>, found: &Continuous) -> Option<Finding
             } else {
                 "joint_ahead"
             };
-            let timed = layout.data.recording.iter().zip(&layout.data.rates);
-            let timed: BTreeSet<&str> = timed
-                .filter(|(_, rates)| rates.is_some())
-                .map(|(recording, _)| layout.recordings[recording.0].name.as_str())
-                .collect();
             let finding = Finding::of_kind(catalog::CLOCK_LAG, kind, Subject::joint(name))
                 .with("offset", Fact::seconds(seconds.abs()))
-                .with("recordings", Fact::names(timed));
+                .with("recordings", Fact::names(timed(layout)));
             with_late_joint(finding, layout.inputs, name, seconds)
+        }
+        Hypothesis::LatencyBeyond { joint, seconds } => {
+            let name = layout.joint(joint);
+            let kind = if seconds > 0.0 {
+                "joints_behind"
+            } else {
+                "joints_ahead"
+            };
+            let joints = layout.data.moving_with(joint);
+            let joints: Vec<&str> = joints.into_iter().map(|j| layout.joint(j)).collect();
+            let finding = Finding::of_kind(catalog::CLOCK_LAG, kind, Subject::joint(name))
+                .with("joint", Fact::name(name))
+                .with("offset", Fact::seconds(seconds.abs()))
+                .with("recordings", Fact::names(timed(layout)));
+            with_late_joints(finding, layout.inputs, &joints, seconds)
         }
         _ => return None,
     };
     let unit = match found.hypothesis {
         Hypothesis::Coupling { joint, source, .. } => layout.unit_of_share(joint, source),
-        Hypothesis::Latency { .. } => Unit::Second,
+        Hypothesis::Latency { .. } | Hypothesis::LatencyBeyond { .. } => Unit::Second,
         _ => Unit::One,
     };
     Some(
@@ -190,11 +199,18 @@ fn continuous_finding(layout: &Layout<'_>, found: &Continuous) -> Option<Finding
     )
 }
 
+/// The recordings whose rows have speeds.
+fn timed<'a>(layout: &'a Layout<'_>) -> BTreeSet<&'a str> {
+    let rows = layout.data.recording.iter().zip(&layout.data.rates);
+    rows.filter(|(_, rates)| rates.is_some())
+        .map(|(recording, _)| layout.recordings[recording.0].name.as_str())
+        .collect()
+}
+
 /// The profile frees an effect of the joint, declares the coupling, or lets the clock be estimated: the fit accounts for it.
 fn is_declared(layout: &Layout<'_>, hypothesis: &Hypothesis) -> bool {
     if let Hypothesis::Lag { recording, .. } = *hypothesis {
-        let alignment = layout.recordings[recording.0].alignment.as_ref();
-        return alignment.is_some_and(|a| a.unknowns() != ClockUnknowns::None);
+        return layout.estimates_clock(recording);
     }
     let (Hypothesis::Gain { joint, .. } | Hypothesis::Coupling { joint, .. }) = *hypothesis else {
         return false;

@@ -102,6 +102,7 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
     let prior = &inputs.robot.profile.solve.prior;
     options.prior_angle = options.prior_angle.max(prior.angle);
     options.prior_length = options.prior_length.max(prior.position);
+    options.clocks_estimated = layout.clocks_are_estimated();
     let computed = bodies::computed(&layout, tracks);
     let of_bodies = computed.iter().map(|one| one.finding(&layout));
     found.findings.extend(of_bodies);
