@@ -622,3 +622,94 @@ fn huge_profiles_are_not_read() {
         ran.stderr
     );
 }
+
+/// A folder where a file belongs, and arguments in the wrong order, are called that.
+#[test]
+fn folders_and_exchanged_arguments() {
+    let dir = ripley()
+        .file("res/report.json", "{}")
+        .file("res/arm.calibrated.model.json", "{}");
+    let folder = "it is a folder, not a file";
+    let cases: [(&[&str], &str, &str); 8] = [
+        (
+            &["predict", "res", CHECKS],
+            folder,
+            "give the model file in this folder: `res/arm.calibrated.model.json`",
+        ),
+        (
+            &["predict", "robots", CHECKS],
+            folder,
+            "give the `<robot>.calibrated.model.json` that `calib run` wrote",
+        ),
+        (&["diff", "robots", URDF], folder, "name a file in it"),
+        (&["fit", "cor", "robots"], folder, "name a file in it"),
+        (
+            &["init", "robots", "--out", "new.yaml"],
+            folder,
+            "name a file in it",
+        ),
+        (
+            &["init", PROFILE, "--out", "new.yaml"],
+            "this is a profile of calib, not a URDF",
+            "calib init --edit robots/ripley.yaml RECORDING...",
+        ),
+        (
+            &["apply", URDF, "res", "--diff"],
+            "they are exchanged",
+            "calib apply res robots/ripley/r17.urdf",
+        ),
+        (
+            &["apply", URDF, "res/report.json", "--diff"],
+            "they are exchanged",
+            "calib apply res/report.json robots/ripley/r17.urdf",
+        ),
+    ];
+    for (arguments, finding, remedy) in cases {
+        let ran = dir.calib_with(arguments);
+        let said = &ran.stderr;
+        assert!(ran.code > 0, "{arguments:?}: {said}");
+        assert!(said.contains(finding), "{arguments:?}: {said}");
+        assert!(said.contains(remedy), "{arguments:?}: {said}");
+        assert!(!said.contains("os error"), "{arguments:?}: {said}");
+    }
+}
+
+/// What an editor of Windows writes: a backslash in double quotes, and tabs.
+#[test]
+fn backslashes_and_tabs_in_a_profile() {
+    let cases = [
+        (
+            "file: \"ripley\\base_sweep.csv\"",
+            "`\\` begins an escape",
+            "`ripley/base_sweep.csv`",
+        ),
+        (
+            "file: \"C:\\Users\\base_sweep.csv\"",
+            "`\\` begins an escape",
+            "`C:/Users/base_sweep.csv`",
+        ),
+        (
+            "file: \"ripley\\table.csv\"",
+            "`\\` begins an escape",
+            "`ripley/table.csv`",
+        ),
+        (
+            "\tfile: ripley/base_sweep.csv",
+            "indented with a tab",
+            "indent with spaces",
+        ),
+    ];
+    for (written, finding, remedy) in cases {
+        let from = match written.starts_with('\t') {
+            true => "    file: ripley/base_sweep.csv",
+            false => "file: ripley/base_sweep.csv",
+        };
+        let ran = ripley()
+            .edit(PROFILE, from, written)
+            .calib(["check", PROFILE]);
+        let said = &ran.stderr;
+        assert_eq!(ran.code, 2, "{said}");
+        assert!(said.contains(finding), "{written}: {said}");
+        assert!(said.contains(remedy), "{written}: {said}");
+    }
+}

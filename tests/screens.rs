@@ -190,6 +190,44 @@ fn one_line_and_all_tables() {
     );
 }
 
+/// In a terminal of 60 columns, whatever a command says is wrapped, and nothing is cut.
+#[test]
+fn narrow_terminals() {
+    let dir = ripley();
+    let narrow = [("COLUMNS", "60")];
+    let commands: [(&[&str], i32); 5] = [
+        (&["run", PROFILE, "-o", "out", "--full"], 0),
+        (&["drift", "out", "out"], 0),
+        (
+            &[
+                "plan",
+                PROFILE,
+                "--poses",
+                "12",
+                "--candidates",
+                "128",
+                "-o",
+                "plan",
+            ],
+            0,
+        ),
+        (
+            &["apply", "out", "robots/ripley/r17.urdf", "-o", "new.urdf"],
+            0,
+        ),
+        (&["fit", "cor", "robots/ripley/base_sweep.csv"], 3),
+    ];
+    for (arguments, code) in commands {
+        let ran = dir.calib_in(arguments, &narrow);
+        assert_eq!(ran.code, code, "{arguments:?}: {}", ran.stderr);
+        let said = ran.stdout.lines().chain(ran.stderr.lines());
+        for line in said {
+            assert!(line.chars().count() <= 60, "{arguments:?}: {line}");
+            assert!(!line.trim_end().ends_with("m…"), "{arguments:?}: {line}");
+        }
+    }
+}
+
 #[test]
 fn colors_are_as_asked_for() {
     let dir = Scratch::new().brief("ripley");

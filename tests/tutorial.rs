@@ -233,3 +233,37 @@ fn the_tutorial_shows_the_profile_that_lies_beside_it() {
         "book/src/tutorial.md shows another profile than {FOLDER}/arm.yaml"
     );
 }
+
+/// One report gives one number for one thing: postures that count, what was excluded and what the fit rejected, and clocks that differ.
+#[test]
+fn the_report_of_the_tutorial_does_not_contradict_itself() {
+    let files = ["arm.urdf", "arm.yaml"].map(str::to_owned).into_iter();
+    let exports = ["fit", "check"]
+        .into_iter()
+        .flat_map(|part| ["vicon", "robot"].map(|machine| format!("2026-05-{part}-{machine}.csv")));
+    let dir = files.chain(exports).fold(Scratch::new(), |dir, name| {
+        let text = fs::read(root().join(FOLDER).join(&name)).expect("committed");
+        dir.file(&name, text)
+    });
+    dir.calib(["run", "arm.yaml", "-o", "out"]).expect(0);
+    let report = dir.read("out/report.json");
+    let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
+    let postures = &report["verification"]["held_out"]["postures"];
+    let verified = format!("Verified on {postures} held-out postures");
+    let scope = report["scope"].as_array().expect("a list");
+    let says = |line: &serde_json::Value| line.as_str().is_some_and(|l| l.contains(&verified));
+    assert!(scope.iter().any(says), "{verified}: {scope:?}");
+    // Every recording's clocks are 2.7 s apart, and a finding says so.
+    for clock in report["clocks"].as_array().expect("a list") {
+        assert_eq!(clock["agrees"], false, "{clock}");
+    }
+    let text = dir.read("out/report.md");
+    for said in [
+        "12 measurements of the fitted recordings were excluded before the fit.",
+        "12 of 128 (9 %) measurements of the fitted recordings were excluded before the fit or rejected by it.",
+        "It writes to `results/arm` there",
+        "no, but they were aligned by the motion",
+    ] {
+        assert!(text.contains(said), "`{said}` is not in\n{text}");
+    }
+}

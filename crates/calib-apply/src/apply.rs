@@ -59,6 +59,12 @@ const SAME_ROBOT: f64 = 1e-6;
 /// # Errors
 /// [`ApplyError`] with place, finding and remedy; nothing is written then.
 pub fn apply(request: &ApplyRequest) -> Result<Applied, ApplyError> {
+    if result::are_exchanged(&request.result, &request.target) {
+        return Err(ApplyError::Exchanged {
+            result: request.target.clone(),
+            target: request.result.clone(),
+        });
+    }
     let result = result::find(&request.result, request.force)?;
     let mut target = Target::read(&request.target, request.yaml.as_deref())?;
     let mut notes = result.notes.clone();

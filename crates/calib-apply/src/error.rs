@@ -34,6 +34,18 @@ pub enum ApplyError {
         /// The path.
         path: PathBuf,
     },
+    /// The result was given as the target, and the target as the result.
+    #[error(
+        "{} is a result, and {} the file to change: they are exchanged\n  help: give the result first: calib apply {} {}",
+        result.display(), target.display(),
+        calib_report::shell_path(&result.to_string_lossy()), calib_report::shell_path(&target.to_string_lossy())
+    )]
+    Exchanged {
+        /// What was given as the target.
+        result: PathBuf,
+        /// What was given as the result.
+        target: PathBuf,
+    },
     /// A YAML without origins of joints was to be compared.
     #[error(
         "{}: this YAML holds no origins of joints{}\n  help: give a URDF, a xacro, or a YAML of origins like `kinematics_params`{}",
@@ -225,6 +237,7 @@ impl ApplyError {
             Self::Read(_) | Self::Edit(_) | Self::Unwritable(_) => None,
             Self::Report(error) => Some(error.path()),
             Self::File(error) => error.path(),
+            Self::Exchanged { target, .. } => Some(target),
             Self::NoResult { path }
             | Self::NoOrigins { path, .. }
             | Self::NotAccepted { path, .. }

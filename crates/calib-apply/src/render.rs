@@ -29,9 +29,9 @@ fn undo(file: &FileChange, destination: &Destination) -> Option<String> {
     })
 }
 
-/// For a terminal: what moved, which lines change, what was written, how to undo it.
+/// For a terminal of so many columns: what moved, which lines change, what was written, how to undo it.
 #[must_use]
-pub fn text(applied: &Applied) -> String {
+pub fn text(applied: &Applied, columns: usize) -> String {
     let mut out = String::new();
     // Writing to a String does not fail.
     let _ = writeln!(
@@ -60,7 +60,7 @@ pub fn text(applied: &Applied) -> String {
             if lines.len() == 1 { "" } else { "s" },
             ranges(&lines)
         );
-        out += &calib_report::terminal::wrapped(&line, "", "  ");
+        out += &calib_report::terminal::wrapped(&line, columns, "", "  ");
     }
     if applied.destination == Destination::Nowhere {
         for file in &applied.files {
@@ -85,7 +85,7 @@ pub fn text(applied: &Applied) -> String {
         }
     }
     for note in &applied.notes {
-        out += &calib_report::terminal::wrapped(note, "note: ", "      ");
+        out += &calib_report::terminal::wrapped(note, columns, "note: ", "      ");
     }
     out
 }

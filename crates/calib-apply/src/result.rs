@@ -107,6 +107,13 @@ fn effects_path(urdf: &Path) -> PathBuf {
     ))
 }
 
+/// Whether the target is a result and the result is none: a folder with a report or a JSON file is never changed.
+pub(crate) fn are_exchanged(result: &Path, target: &Path) -> bool {
+    let is_json = |path: &Path| path.extension().is_some_and(|end| end == "json");
+    let target_is_result = target.join(REPORT).is_file() || target.is_file() && is_json(target);
+    target_is_result && result.is_file() && !is_json(result)
+}
+
 /// The calibrated URDF, and the report where there is one.
 fn locate(path: &Path) -> Result<(PathBuf, Option<Report>), ApplyError> {
     let name = path.display().to_string();

@@ -275,7 +275,9 @@ impl CliError {
 
 fn of_apply(error: &ApplyError) -> ExitCode {
     match error {
-        ApplyError::Read(_) | ApplyError::YamlUnused { .. } => ExitCode::Usage,
+        ApplyError::Read(_) | ApplyError::YamlUnused { .. } | ApplyError::Exchanged { .. } => {
+            ExitCode::Usage
+        }
         ApplyError::NotAccepted { .. } => ExitCode::VerdictFail,
         ApplyError::File(error) => of_file(error),
         // A file that was given and is not what it should be.

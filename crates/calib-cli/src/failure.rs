@@ -8,7 +8,7 @@ use calib_pipeline::ExitCode;
 use crate::arguments::Arguments;
 use crate::error::place::Place;
 use crate::error::{CliError, HELP};
-use crate::terminal::{emit, say};
+use crate::terminal::{emit, folded, say};
 
 /// Says why a command failed; returns the exit code.
 pub fn failed(arguments: &Arguments, error: &CliError) -> u8 {
@@ -18,7 +18,7 @@ pub fn failed(arguments: &Arguments, error: &CliError) -> u8 {
         let remedy = error.remedy_of(&said);
         return emit_error((error.id(), &said), error.place(), remedy.as_deref(), code);
     }
-    say(&format!("error: {}", self::said(error)));
+    say(&folded(&format!("error: {}", self::said(error))));
     code
 }
 
@@ -45,7 +45,7 @@ pub fn misused(error: &clap::Error, arguments: &[OsString]) -> u8 {
         return match emit(&page) {
             Ok(()) => 0,
             Err(error) => {
-                say(&format!("error: {error}"));
+                say(&folded(&format!("error: {error}")));
                 error.exit_code() as u8
             }
         };
@@ -55,7 +55,7 @@ pub fn misused(error: &clap::Error, arguments: &[OsString]) -> u8 {
         let said = plain.trim().trim_start_matches("error: ");
         return emit_error(("usage", said), None, Some(HELP), usage);
     }
-    say(text.to_string().trim_end());
+    say(&folded(text.to_string().trim_end()));
     usage
 }
 

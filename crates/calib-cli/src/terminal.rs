@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::Duration;
 
 use calib_finding::{printable, printable_in_color};
-use calib_report::terminal::Look;
+use calib_report::terminal::{Look, wrapped};
 use clap::{Args, ValueEnum};
 use indicatif::{ProgressBar, ProgressStyle};
 
@@ -78,6 +78,36 @@ pub fn look(color: When) -> Look {
     }
 }
 
+/// A message on standard error as wide as that terminal: long lines are wrapped, quoted lines of a file stay. Elsewhere it is unchanged, unless COLUMNS
+/// says how wide a reader shows it.
+#[must_use]
+pub fn folded(text: &str) -> String {
+    let stated = std::env::var("COLUMNS").ok();
+    let stated = stated.and_then(|columns| columns.parse().ok());
+    let seen = || console::Term::stderr().size_checked();
+    let columns = stated.or_else(|| seen().map(|(_, columns)| usize::from(columns)));
+    match columns {
+        Some(columns) => folded_to(text, columns.clamp(*COLUMNS.start(), *COLUMNS.end())),
+        None => text.to_owned(),
+    }
+}
+
+fn folded_to(text: &str, columns: usize) -> String {
+    let fold = |line: &str| {
+        let inner = line.trim_start();
+        // `14 |     rom_degg: [0, 120]`: the mark below it points into the line.
+        let number = inner.trim_start_matches(|c: char| c.is_ascii_digit());
+        let is_quoted = number.starts_with(" |") || inner.starts_with('|');
+        if line.chars().count() <= columns || is_quoted {
+            return line.to_owned();
+        }
+        let indent = " ".repeat(line.len() - inner.len());
+        let folded = wrapped(inner, columns, &indent, &format!("{indent}  "));
+        folded.trim_end().to_owned()
+    };
+    text.split('\n').map(fold).collect::<Vec<_>>().join("\n")
+}
+
 /// Writes results to standard output, with no control characters but those of colors.
 ///
 /// # Errors
@@ -115,7 +145,7 @@ pub fn say(text: &str) {
 pub fn say_note(console: &Console, note: &str) {
     match console.json {
         true => say(&serde_json::json!({"note": note}).to_string()),
-        false => say(&format!("calib: {note}")),
+        false => say(&folded(&format!("calib: {note}"))),
     }
 }
 
@@ -215,4 +245,27 @@ fn bar(quiet: bool, template: &str) -> ProgressBar {
         bar.set_style(style);
     }
     bar
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_message_keeps_to_the_width_and_its_quoted_lines_stay() {
+        let quoted =
+            "14 |     rom_degg: [0, 120], and a line of the file that is far longer than that";
+        let text = format!(
+            "error: robots/arm.yaml:14:5: unknown field `rom_degg`, expected one of name, rom_deg\n{quoted}\n  help: a remedy of more words than a line of forty columns has room for"
+        );
+        let folded = folded_to(&text, 40);
+        let lines = folded.lines().filter(|line| *line != quoted);
+        let lines: Vec<&str> = lines.collect();
+        assert!(lines.iter().all(|l| l.chars().count() <= 40), "{folded}");
+        assert!(folded.contains(quoted), "{folded}");
+        assert!(
+            lines.contains(&"    forty columns has room for"),
+            "{folded}"
+        );
+    }
 }

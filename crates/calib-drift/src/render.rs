@@ -7,18 +7,19 @@ use calib_report::{number, printable_line, terminal};
 use crate::compare::{Changed, Drift, Undecided};
 use crate::error::DriftError;
 
-/// For a terminal, at most 80 columns: the answer first, then what moved and by how much.
+/// For a terminal of so many columns: the answer first, then what moved and by how much.
 #[must_use]
-pub fn text(drift: &Drift) -> String {
+pub fn text(drift: &Drift, columns: usize) -> String {
     let mut out = String::new();
     // Writing to a String does not fail.
     let robot = printable_line(&drift.robot);
-    let _ = writeln!(out, "{} → {} · {robot}", drift.old, drift.new);
+    let title = format!("{} → {} · {robot}", drift.old, drift.new);
+    out += &terminal::wrapped(&title, columns, "", "  ");
     let significant: Vec<&Changed> = drift.numbers.iter().filter(|n| n.significant).collect();
     let (free, entangled): (Vec<&Changed>, Vec<&Changed>) =
         significant.iter().partition(|n| n.gauge_free);
-    out += &headline(drift, &significant);
-    out += &warnings(drift);
+    out += &headline(drift, &significant, columns);
+    out += &warnings(drift, columns);
     out += &terminal::wrapped(
         &format!(
             "all at once: squared distance {:.1}, p {} ({} directions that both recordings see)",
@@ -26,6 +27,7 @@ pub fn text(drift: &Drift) -> String {
             probability(drift.joint.p_value),
             drift.joint.degrees_of_freedom
         ),
+        columns,
         "- ",
         "  ",
     );
@@ -36,18 +38,21 @@ pub fn text(drift: &Drift) -> String {
             drift.numbers.len(),
             number::fixed(100.0 * drift.false_alarms, 0)
         ),
+        columns,
         "- ",
         "  ",
     );
     let moved = heading(drift);
-    section(&mut out, moved, &free);
+    section(&mut out, (moved, columns), &free);
     section(
         &mut out,
-        if free.is_empty() {
-            moved
-        } else {
-            "The same in the parameters' own frames"
-        },
+        (
+            match free.is_empty() {
+                true => moved,
+                false => "The same in the parameters' own frames",
+            },
+            columns,
+        ),
         &entangled,
     );
     let still: Vec<&Changed> = drift
@@ -56,12 +61,12 @@ pub fn text(drift: &Drift) -> String {
         .filter(|n| !n.significant && n.gauge_free)
         .collect();
     if drift.changed || !still.is_empty() {
-        section(&mut out, &not_significant(drift), &still);
+        section(&mut out, (&not_significant(drift), columns), &still);
     }
     let mut list = |what: &str, names: &[String]| {
         if !names.is_empty() {
             out.push('\n');
-            out += &terminal::wrapped(&format!("{what}: {}", names.join(", ")), "", "  ");
+            out += &terminal::wrapped(&format!("{what}: {}", names.join(", ")), columns, "", "  ");
         }
     };
     list(
@@ -76,7 +81,7 @@ pub fn text(drift: &Drift) -> String {
     );
     let mut note = |text: String| {
         out.push('\n');
-        out += &terminal::wrapped(&text, "", "  ");
+        out += &terminal::wrapped(&text, columns, "", "  ");
     };
     if !drift.same_nominal {
         note(
@@ -92,7 +97,7 @@ pub fn text(drift: &Drift) -> String {
             drift.directions_not_credible
         ));
     }
-    out += &zeros_not_compared(drift);
+    out += &zeros_not_compared(drift, columns);
     if !drift.known_in_neither.is_empty() {
         out.push('\n');
         out += &terminal::wrapped(
@@ -101,6 +106,7 @@ pub fn text(drift: &Drift) -> String {
                  test of all at once",
                 drift.known_in_neither.len()
             ),
+            columns,
             "",
             "  ",
         );
@@ -117,7 +123,7 @@ fn heading(drift: &Drift) -> &'static str {
 }
 
 /// The joints whose zeros are not compared; those of the others are angles between their neighbors.
-fn zeros_not_compared(drift: &Drift) -> String {
+fn zeros_not_compared(drift: &Drift, columns: usize) -> String {
     let is_compared = |joint: &&str| {
         let own = [format!("zero.{joint}"), format!("{joint}.offset")];
         drift.numbers.iter().any(|n| own.contains(&n.name))
@@ -134,15 +140,16 @@ fn zeros_not_compared(drift: &Drift) -> String {
         "Not compared: the zeros of {}, which the recordings do not distinguish from the places of robot, tracker and bodies.",
         zeros.join(", ")
     );
-    format!("\n{}", terminal::wrapped(&text, "", "  "))
+    format!("\n{}", terminal::wrapped(&text, columns, "", "  "))
 }
 
 /// What makes the answer another one than that about the robot.
-fn warnings(drift: &Drift) -> String {
+fn warnings(drift: &Drift, columns: usize) -> String {
     let mut out = String::new();
     if drift.same_recordings {
         out += &terminal::wrapped(
             "Both were made from the same recordings, byte for byte: this compares profiles, not the robot at two times.",
+            columns,
             "warning: ",
             "  ",
         );
@@ -153,23 +160,23 @@ fn warnings(drift: &Drift) -> String {
                 "the residuals of {file} show an effect that its model lacks ({}). In other postures it looks like a change of the robot. Free it in both profiles and calibrate again before you trust the following lines.",
                 effects.join(", ")
             );
-            out += &terminal::wrapped(&text, "warning: ", "  ");
+            out += &terminal::wrapped(&text, columns, "warning: ", "  ");
         }
     }
     for file in &drift.rejected {
         let text = format!(
             "{file} is of a rejected calibration: what its model does not explain, as a tracker that moved or an effect, looks like a change of the robot. Read its report first."
         );
-        out += &terminal::wrapped(&text, "warning: ", "  ");
+        out += &terminal::wrapped(&text, columns, "warning: ", "  ");
     }
     out
 }
 
 /// The answer.
-fn headline(drift: &Drift, significant: &[&Changed]) -> String {
+fn headline(drift: &Drift, significant: &[&Changed], columns: usize) -> String {
     let changed = match (drift.undecided, drift.changed, significant.is_empty()) {
         (Some(why), ..) => {
-            let remedy = terminal::wrapped(why.remedy(), "", "  ");
+            let remedy = terminal::wrapped(why.remedy(), columns, "", "  ");
             return format!("{}{remedy}", why.headline());
         }
         (None, false, _) => "NO SIGNIFICANT CHANGE\n",
@@ -206,17 +213,21 @@ impl Undecided {
     }
 }
 
-fn section(out: &mut String, heading: &str, rows: &[&Changed]) {
+/// Columns of a name beside its change; a longer one stands above it.
+const LEAST: usize = 12;
+
+fn section(out: &mut String, (heading, columns): (&str, usize), rows: &[&Changed]) {
     if rows.is_empty() {
         return;
     }
-    let _ = writeln!(out, "\n{heading}");
-    // The longest weight leaves less room on a line of 80.
-    let room = if rows.iter().all(|r| r.significant) {
-        48
-    } else {
-        34
+    out.push('\n');
+    *out += &terminal::wrapped(heading, columns, "", "  ");
+    // What a change and its weight need; the longest weight needs more.
+    let numbers = match rows.iter().all(|r| r.significant) {
+        true => 32,
+        false => 46,
     };
+    let room = columns.saturating_sub(numbers).max(LEAST);
     let width = rows
         .iter()
         .map(|r| r.text.chars().count())
@@ -227,7 +238,7 @@ fn section(out: &mut String, heading: &str, rows: &[&Changed]) {
         let change = number::change(row.change, Some(row.sigma), row.unit);
         let weight = weight(row);
         if row.text.chars().count() > width {
-            let _ = writeln!(out, "  {}", row.text);
+            *out += &terminal::wrapped(&row.text, columns, "  ", "    ");
             let _ = writeln!(out, "  {:width$}  {change}  {weight}", "");
         } else {
             let _ = writeln!(out, "  {:width$}  {change}  {weight}", row.text);

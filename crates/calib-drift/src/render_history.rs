@@ -46,9 +46,9 @@ fn change(value: &Value, unit: Unit) -> String {
     format!("{change}  ({sigmas:.1} σ)")
 }
 
-/// For a terminal, at most 80 columns: the calibrations, then each quantity with its change since the first.
+/// For a terminal of so many columns: the calibrations, then each quantity with its change since the first.
 #[must_use]
-pub fn history_text(history: &History) -> String {
+pub fn history_text(history: &History, columns: usize) -> String {
     let mut out = String::new();
     // Writing to a String does not fail.
     let _ = writeln!(
@@ -65,10 +65,16 @@ pub fn history_text(history: &History) -> String {
     }
     for (i, of) in history.calibrations.iter().enumerate() {
         let line = format!("{}  {}", of.report, since((i, of)));
-        out += &terminal::wrapped(line.trim_end(), &format!("{}  ", named(i, of)), "      ");
+        out += &terminal::wrapped(
+            line.trim_end(),
+            columns,
+            &format!("{}  ", named(i, of)),
+            "      ",
+        );
     }
     for track in &history.quantities {
-        let _ = writeln!(out, "\n{}", track.text);
+        out.push('\n');
+        out += &terminal::wrapped(&track.text, columns, "", "  ");
         for (i, of) in history.calibrations.iter().enumerate() {
             let line = match track.values.get(i).copied().flatten() {
                 None => "not determined".to_owned(),

@@ -310,7 +310,7 @@ fn a_difference_of_calibrations_with_other_parameters_is_not_decided() {
     let drift = compare(&of(&old), &of(&new)).expect("one robot");
     assert!(!drift.changed && drift.joint.significant);
     assert_eq!(drift.undecided, Some(Undecided::OtherParameters));
-    let text = calib_drift::text(&drift);
+    let text = calib_drift::text(&drift, 80);
     assert!(text.contains("NOT DECIDED"), "{text}");
     assert!(text.lines().all(|l| l.chars().count() <= 80), "{text}");
 }

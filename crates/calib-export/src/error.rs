@@ -8,11 +8,14 @@ use calib_model::ModelError;
 pub enum ExportError {
     /// The model file cannot be opened.
     #[error(
-        "{file}: cannot be read: {source}\n  help: give the `<robot>.calibrated.model.json` that `calib run` wrote"
+        "{file}: cannot be read: {source}\n  help: {}",
+        instead(model.as_deref())
     )]
     Open {
         /// The file.
         file: String,
+        /// The model file in it, where it is a folder of results.
+        model: Option<String>,
         /// Why.
         source: std::io::Error,
     },
@@ -100,6 +103,14 @@ pub enum ExportError {
         /// What to do.
         remedy: &'static str,
     },
+}
+
+/// What to give in place of what cannot be read.
+fn instead(model: Option<&str>) -> String {
+    model.map_or_else(
+        || "give the `<robot>.calibrated.model.json` that `calib run` wrote".to_owned(),
+        |model| format!("give the model file in this folder: `{model}`"),
+    )
 }
 
 impl ExportError {

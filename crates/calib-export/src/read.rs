@@ -35,6 +35,7 @@ pub fn robot_with(path: &Path, outside: FindOutside<'_>) -> Result<Robot, Export
     let file = path.display().to_string();
     let bytes = calib_files::input::read(path, LARGEST).map_err(|source| ExportError::Open {
         file: file.clone(),
+        model: model_in(path),
         source,
     })?;
     let read = RobotModelFile::from_json(&bytes);
@@ -46,6 +47,17 @@ pub fn robot_with(path: &Path, outside: FindOutside<'_>) -> Result<Robot, Export
             _ => ExportError::Model { file, source },
         }
     })
+}
+
+/// The only model file of a folder of results.
+fn model_in(folder: &Path) -> Option<String> {
+    /// How `calib run` ends the name of a model file.
+    const END: &str = ".calibrated.model.json";
+    let files = std::fs::read_dir(folder).ok()?.filter_map(Result::ok);
+    let models = files.map(|file| file.path());
+    let mut models = models.filter(|path| path.to_string_lossy().ends_with(END));
+    let only = models.next()?;
+    models.next().is_none().then(|| only.display().to_string())
 }
 
 impl Robot {

@@ -4,10 +4,10 @@ use std::fs::{File, OpenOptions};
 use std::io::{Error, ErrorKind, Read as _, Result};
 use std::path::Path;
 
-/// Opens a regular file for reading. A pipe, a socket or a device is refused, and none is waited for.
+/// Opens a regular file for reading. A folder, a pipe, a socket or a device is refused, and none is waited for.
 ///
 /// # Errors
-/// What the system says; [`ErrorKind::InvalidInput`] for what is no regular file.
+/// What the system says; [`ErrorKind::IsADirectory`] for a folder, [`ErrorKind::InvalidInput`] for anything else that is no regular file.
 pub fn open(path: &Path) -> Result<File> {
     let mut options = OpenOptions::new();
     options.read(true);
@@ -16,9 +16,13 @@ pub fn open(path: &Path) -> Result<File> {
     std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, libc::O_NONBLOCK);
     let file = options.open(path)?;
     let kind = file.metadata()?.file_type();
-    // A folder is refused by the system when it is read, with its own words.
-    if kind.is_file() || kind.is_dir() {
+    if kind.is_file() {
         return Ok(file);
+    }
+    // The system refuses it only when it is read, and with a number.
+    if kind.is_dir() {
+        let text = "it is a folder, not a file";
+        return Err(Error::new(ErrorKind::IsADirectory, text));
     }
     Err(Error::new(
         ErrorKind::InvalidInput,

@@ -57,6 +57,14 @@ impl Quantity {
         }
     }
 
+    /// Behind the coordinates; those of a direction have no unit.
+    fn unit(self) -> &'static str {
+        match self {
+            Self::Place(_) => " m",
+            Self::Direction(_) => "",
+        }
+    }
+
     /// m or rad.
     fn distance(self, a: &Vector3<f64>, b: &Vector3<f64>) -> f64 {
         match self {
@@ -127,8 +135,9 @@ pub(crate) fn comparison(quantity: Quantity, lines: &[Line]) -> Answer {
         };
         let _ = writeln!(
             text,
-            "{id:<16} {verdict:<6} {}  sigma {}  {compared}",
+            "{id:<16} {verdict:<6} {}{}  sigma {}  {compared}",
             coordinates(value.as_slice()),
+            quantity.unit(),
             quantity.shown(*sigma),
         );
         values.push(json!({

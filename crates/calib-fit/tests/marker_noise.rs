@@ -133,6 +133,12 @@ fn a_joint_without_a_center_is_said_to_be_one() {
         "{}",
         answer.text
     );
+    // Every line states the unit of its coordinates.
+    let lines = answer.text.lines().filter(|line| line.contains('['));
+    assert!(lines.clone().count() > 0, "{}", answer.text);
+    for line in lines {
+        assert!(line.contains("] m  sigma"), "{line}");
+    }
     // A noise that is stated may be one that all markers share.
     let stated = TableRequest {
         sigma_m: Some(2e-3),

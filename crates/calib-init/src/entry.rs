@@ -2,7 +2,7 @@
 
 use calib_profile::edit::Value;
 use calib_recording::ColumnMap;
-use calib_report::terminal::wrapped;
+use calib_report::terminal::{COLUMNS, wrapped};
 use calib_urdf::{JointId, RobotModel};
 
 use crate::fact::{Fact, Place};
@@ -15,7 +15,7 @@ use crate::yaml;
 #[must_use]
 pub fn comment(indent: &str, text: &str) -> Vec<String> {
     let (first, rest) = (format!("{indent}# "), format!("{indent}#   "));
-    let lines = wrapped(text, &first, &rest);
+    let lines = wrapped(text, COLUMNS, &first, &rest);
     let lines = lines.trim_end().lines();
     lines.map(|line| line[indent.len()..].to_owned()).collect()
 }

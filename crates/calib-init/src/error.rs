@@ -17,6 +17,8 @@ pub enum Instead {
     Pairs([String; 2]),
     /// Bytes that are no text.
     Binary,
+    /// A profile of calib.
+    Profile,
     /// Text that is no XML.
     Text,
 }
@@ -323,6 +325,7 @@ fn instead(found: &Instead) -> String {
         Instead::Pairs([first, second]) => {
             format!("a recording (a table of poses of `{first}` and `{second}`, without joints)")
         }
+        Instead::Profile => "a profile of calib".to_owned(),
         Instead::Binary => "a binary file".to_owned(),
         Instead::Text => "text that is not XML".to_owned(),
     }
@@ -339,6 +342,9 @@ fn instead_of_urdf(found: &Instead, file: &str) -> String {
             "hand-eye calibration needs no URDF: `calib fit handeye {file} --robot {} --measured {}`; for a profile give the URDF of the robot first, and a recording of its joints",
             shell_word(first),
             shell_word(second)
+        ),
+        Instead::Profile => format!(
+            "it needs no other profile: `calib check {file}`, or add recordings to it: `calib init --edit {file} RECORDING...`; for a new profile give the URDF of the robot"
         ),
         Instead::Binary | Instead::Text => {
             "give the URDF of the robot: an XML file that begins with `<robot name=…>`".to_owned()

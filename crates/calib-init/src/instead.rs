@@ -6,6 +6,7 @@ use calib_urdf::{Problem, ReadError, RobotModel};
 use crate::columns::guess;
 use crate::error::{InitError, Instead};
 use crate::header::header;
+use crate::source::is_profile;
 
 /// Bytes of the file that are looked at.
 pub const HEAD: usize = 1 << 20;
@@ -35,6 +36,9 @@ fn instead(head: &[u8]) -> Option<Instead> {
     let first = text.iter().find(|byte| !byte.is_ascii_whitespace())?;
     if *first == b'<' {
         return None;
+    }
+    if is_profile(&String::from_utf8_lossy(text)) {
+        return Some(Instead::Profile);
     }
     let begin = &head[..head.len().min(HEAD_BYTES)];
     let reader = readers().iter().find(|reader| (reader.detect)(begin));

@@ -205,12 +205,15 @@ fn no_recording(bytes: &[u8]) -> Option<NoRecording> {
     if text.starts_with('<') {
         return text.contains("<robot").then_some(NoRecording::Robot);
     }
-    // The version is a key of the first level of every profile, and of nothing else.
-    let is_version = |line: &str| {
+    is_profile(text).then_some(NoRecording::Profile)
+}
+
+/// Whether a text is a profile of calib: the version is a key of the first level of every profile, and of nothing else.
+pub(crate) fn is_profile(text: &str) -> bool {
+    text.lines().any(|line| {
         let version = line.strip_prefix("calib:").map(str::trim);
         version.is_some_and(|v| v.starts_with(|c: char| c.is_ascii_digit()))
-    };
-    text.lines().any(is_version).then_some(NoRecording::Profile)
+    })
 }
 
 /// Numbers that the reader took for lost samples because they repeat.

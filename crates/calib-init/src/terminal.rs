@@ -10,13 +10,14 @@ use crate::fact::{About, Fact};
 use crate::proposal::Proposal;
 use crate::words;
 
-/// The summary; `file`: the profile that was written or edited, `checked`: what its check found.
+/// The summary of so many columns; `file`: the profile that was written or edited, `checked`: what its check found.
 #[must_use]
 pub fn summary(
     proposal: &Proposal,
     edited: Option<&Edited>,
     file: &str,
     checked: &Checked<'_>,
+    columns: usize,
 ) -> String {
     let mut text = String::new();
     let mut block = |title: &str, facts: &[&Fact]| {
@@ -34,7 +35,7 @@ pub fn summary(
                 n => format!("{} and {n} more", words::place(&fact.place)),
             };
             let line = format!("{key}: {}", words::sentence(&fact.about));
-            text += &wrapped(&line, "  ", "    ");
+            text += &wrapped(&line, columns, "  ", "    ");
             if !text.ends_with('\n') {
                 text.push('\n');
             }
@@ -51,7 +52,7 @@ pub fn summary(
                 Some(id) => format!("{id}: {error}"),
                 None => error.clone(),
             };
-            text += &wrapped(&line, "  ", "    ");
+            text += &wrapped(&line, columns, "  ", "    ");
             if !text.ends_with('\n') {
                 text.push('\n');
             }
@@ -62,7 +63,7 @@ pub fn summary(
         true => words::next_of_absent(file),
         false => words::next(file, proposal.skeleton.is_some(), errors.len()),
     };
-    let wrote = wrapped(&words::wrote(file, edited), "", "  ");
+    let wrote = wrapped(&words::wrote(file, edited), columns, "", "  ");
     let wrote = wrote.trim_end();
     format!("{wrote}\n{text}\n{next}\n")
 }

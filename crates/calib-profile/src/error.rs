@@ -237,6 +237,34 @@ fn written_otherwise(
     }
 }
 
+/// The problem of backslashes in double quotes, which begin escapes there.
+pub(crate) fn escaped(text: &str, place: Place) -> Option<Problem> {
+    let meant = slip::backslashes(text, place)?;
+    let finding = "in double quotes `\\` begins an escape, as `\\t` for a tab";
+    let remedy = format!("write `/` in paths, on Windows too: `{meant}`; or use single quotes");
+    Some(Problem::new(Some(place), finding, remedy))
+}
+
+/// The problem of a text that is no YAML.
+fn no_yaml(error: &serde_saphyr::Error, text: &str, place: Option<Place>) -> Problem {
+    if let Some(problem) = place.and_then(|at| escaped(text, at)) {
+        return problem;
+    }
+    if place.is_some_and(|at| slip::tab(text, at)) {
+        let finding = "this line is indented with a tab, which YAML does not allow";
+        return Problem::new(place, finding, "indent with spaces, two for each level");
+    }
+    let full = error.to_string();
+    let first = full.lines().next().unwrap_or("not readable as YAML");
+    // The place stands before the message.
+    let finding = match first.rsplit_once(" at line ") {
+        Some((finding, _)) if place.is_some() => finding.to_owned(),
+        _ => first.to_owned(),
+    };
+    let remedy = "a profile is YAML: keys, colons, indentation; see the profiles in `robots/`";
+    Problem::new(place, finding, remedy)
+}
+
 pub(crate) fn from_yaml(error: &serde_saphyr::Error, text: &str, file: &str) -> ProfileError {
     use serde_saphyr::Error as Yaml;
     let error = error.without_snippet();
@@ -305,18 +333,8 @@ pub(crate) fn from_yaml(error: &serde_saphyr::Error, text: &str, file: &str) -> 
             misformed(form(expected).unwrap_or(Form::Value), &path)
         }
         other => {
-            let full = other.to_string();
-            let first = full.lines().next().unwrap_or("not readable as YAML");
-            // The place stands before the message.
-            let finding = match first.rsplit_once(" at line ") {
-                Some((finding, _)) if place.is_some() => finding.to_owned(),
-                _ => first.to_owned(),
-            };
-            (
-                finding,
-                "a profile is YAML: keys, colons, indentation; see the profiles in `robots/`"
-                    .to_owned(),
-            )
+            let problem = no_yaml(other, text, place);
+            return ProfileError::new(file, text, vec![problem]);
         }
     };
     ProfileError::new(file, text, vec![Problem::new(place, finding, remedy)])

@@ -56,3 +56,22 @@ pub(crate) fn time_column(column: &str) -> String {
     let unit = ["ms", "us", "ns"].into_iter().find(|known| *known == unit);
     format!("time: {{column: {column}, unit: {}}}", unit.unwrap_or("s"))
 }
+
+/// The text in double quotes that begins at the place, with a backslash in it: as a person means a path of Windows, with `/`.
+pub(crate) fn backslashes(text: &str, place: Place) -> Option<String> {
+    let (_, from) = around(text, place)?;
+    let quoted = from.strip_prefix('"')?;
+    let written = &quoted[..quoted.find('"')?];
+    written
+        .contains('\\')
+        .then(|| written.replace("\\\\", "/").replace('\\', "/"))
+}
+
+/// Whether the line of a place is indented by a tab.
+pub(crate) fn tab(text: &str, place: Place) -> bool {
+    let line = place.line.checked_sub(1).and_then(|i| text.lines().nth(i));
+    line.is_some_and(|line| {
+        let indent = line.len() - line.trim_start().len();
+        line[..indent].contains('\t')
+    })
+}

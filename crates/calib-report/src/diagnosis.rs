@@ -22,6 +22,9 @@ pub enum Diagnosis {
         /// Nothing but the residuals of the fit tells that noise: what the recordings or the model lack is part of it.
         #[serde(default)]
         from_residuals: bool,
+        /// How many times the stated noise that is, where the markers scatter as much about their own bodies; null elsewhere.
+        #[serde(default)]
+        above_stated: Option<f64>,
     },
     /// The data, the wiring or the model have an error of structure: a wrong sign, swapped names, a moved body.
     StructuralFault {
@@ -50,6 +53,9 @@ pub enum Diagnosis {
         /// Whether poses of the fit help more: that many validation postures are out of proportion.
         #[serde(default)]
         fitted: bool,
+        /// What the tracker's noise contributes to the error, m, where that is most of it; null elsewhere.
+        #[serde(default)]
+        tracker_m: Option<f64>,
     },
     /// No limit is exceeded, but predictions are less certain than the result states.
     BeyondStated {
@@ -106,6 +112,7 @@ fn below_noise(report: &Report) -> Option<Diagnosis> {
         limit_m: limit.limit,
         tracker_m,
         from_residuals: from_residuals(report),
+        above_stated: of_scatter(report).map(|[factor, _]| factor),
     })
 }
 
@@ -119,6 +126,15 @@ fn from_residuals(report: &Report) -> bool {
 /// Noise of one coordinate, m, that no tracker has with which robots are calibrated: where none is stated, what the model lacks was found as noise.
 const NO_TRACKER: f64 = 0.01;
 
+/// How many times the stated noise was found, and how many times as much markers scatter about their own bodies, which no error of the robot makes them do;
+/// `None` where the scatter does not explain the noise.
+fn of_scatter(report: &Report) -> Option<[f64; 2]> {
+    let mut reasons = report.reason_facts.iter();
+    let above = reasons.find(|reason| reason.id == ReasonId::NoiseAboveStated)?;
+    let value = |key| above.values.get(key).and_then(Fact::value);
+    Some([value("factor")?, value("rigid")?])
+}
+
 /// Stated noise of the tracker over the noise that was found, at most 1: what a model lacks is found as noise, too. Where that is known, no more
 /// than the stated noise is called the tracker's anyway. Where none is stated, and the noise is far above the scatter of the markers about their bodies, it
 /// is not the tracker's.
@@ -126,6 +142,9 @@ fn stated_share(report: &Report) -> f64 {
     let lacking = [catalog::MISSING_PHYSICS, catalog::CHANGED_WHILE_RECORDING];
     if report.findings.iter().any(|f| lacking.contains(&f.id)) {
         return 1.0;
+    }
+    if let Some([factor, rigid]) = of_scatter(report) {
+        return (rigid / factor).min(1.0);
     }
     let mut reasons = report.reason_facts.iter();
     let above = reasons.find(|reason| reason.id == ReasonId::NoiseAboveScatter);
@@ -345,9 +364,11 @@ fn undecided(report: &Report) -> Option<Diagnosis> {
         let postures = postures.map(|n| n as usize).filter(|n| *n > 0);
         let held_out = report.verification.held_out.as_ref();
         let now = held_out.map_or(0, |h| if h.left_out { 0 } else { h.postures });
+        let fitted = now > 0 && postures.is_some_and(|n| n > OUT_OF_PROPORTION * now);
         return Some(Diagnosis::TooFewPoses {
             postures,
-            fitted: now > 0 && postures.is_some_and(|n| n > OUT_OF_PROPORTION * now),
+            fitted,
+            tracker_m: mostly_tracker(report).filter(|_| fitted),
         });
     }
     if has(ReasonId::NoLimits).is_some() {
@@ -366,7 +387,15 @@ fn undecided(report: &Report) -> Option<Diagnosis> {
     .map(|_| Diagnosis::TooFewPoses {
         postures: None,
         fitted: false,
+        tracker_m: None,
     })
+}
+
+/// What the tracker's noise contributes to the position error on new poses, m, where that is more than half of its variance: better geometry hardly lowers it.
+fn mostly_tracker(report: &Report) -> Option<f64> {
+    let expected = report.verification.held_out.as_ref()?.expected?;
+    let tracker_m = expected.tracker_m? * stated_share(report);
+    (2.0 * tracker_m.powi(2) > expected.rms_m.powi(2)).then_some(tracker_m)
 }
 
 #[cfg(test)]
@@ -413,6 +442,7 @@ mod tests {
         let poses = Diagnosis::TooFewPoses {
             postures: None,
             fitted: false,
+            tracker_m: None,
         };
         assert_eq!(of(vec![undecided()]), Some(poses.clone()));
         assert_eq!(

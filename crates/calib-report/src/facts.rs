@@ -226,4 +226,6 @@ pub enum ClockCheck {
     NotTested,
     /// Streams were aligned.
     Aligned,
+    /// Joints and tracker share the rows of one table, and a finding says that they are not of the same time.
+    Noticed,
 }

@@ -150,13 +150,34 @@ impl Table {
             .iter()
             .map(|row| row.iter().map(String::as_str).collect::<Vec<_>>());
         for row in has_heads.then_some(heads).into_iter().chain(rows) {
-            let cells: Vec<String> = row
-                .iter()
-                .zip(&self.heads)
-                .zip(&widths)
-                .map(|((text, head), width)| pad(&clip(text, *width), *width, head.1))
+            text += &self.plain_row(&row, &widths);
+        }
+        text
+    }
+
+    /// A row of [`Self::plain`]: a text that is wider than its column goes on in the lines below.
+    fn plain_row(&self, row: &[&str], widths: &[usize]) -> String {
+        let cells: Vec<Vec<String>> = row
+            .iter()
+            .zip(widths)
+            .map(|(text, width)| match text.chars().count() > *width {
+                true => wrap(text, *width, "", "")
+                    .lines()
+                    .map(str::to_owned)
+                    .collect(),
+                false => vec![(*text).to_owned()],
+            })
+            .collect();
+        let mut text = String::new();
+        for k in 0..cells.iter().map(Vec::len).max().unwrap_or(0) {
+            let line = cells.iter().zip(&self.heads).zip(widths);
+            let line: Vec<String> = line
+                .map(|((cell, head), width)| {
+                    let part = cell.get(k).map_or("", String::as_str);
+                    pad(part, *width, head.1)
+                })
                 .collect();
-            text += format!("  {}", cells.join("  ")).trim_end();
+            text += format!("  {}", line.join("  ")).trim_end();
             text.push('\n');
         }
         text
@@ -277,6 +298,17 @@ mod tests {
             "{text}"
         );
         assert!(text.contains("1234.567"), "{text}");
+        // Nothing is cut: what does not fit stands in the line below.
+        let lines = text.lines().skip(1);
+        let names: String = lines
+            .flat_map(|line| line.chars().skip(2).take(8))
+            .collect();
+        assert!(
+            names
+                .replace(' ', "")
+                .contains("a_very_long_name_of_a_marker"),
+            "{text}"
+        );
     }
 
     #[test]

@@ -5,7 +5,7 @@ mod look;
 mod short;
 
 pub use check::data_checks;
-pub use look::{Look, Places};
+pub use look::{COLUMNS, Look, Places};
 
 use crate::table::{Table, markup_free, wrap};
 use crate::words;
@@ -14,12 +14,12 @@ use crate::words::prose::{full_stop, sentence};
 use crate::{Outcome, Report, RobotChange, Selection, Severity, Unit, number};
 use anstyle::{AnsiColor, Style};
 use calib_finding::catalog;
-use look::{COLUMNS, painted};
+use look::painted;
 
-/// Text wrapped to the width of a terminal; `first` precedes the first line, `rest` the others.
+/// Text wrapped to this many columns; `first` precedes the first line, `rest` the others.
 #[must_use]
-pub fn wrapped(text: &str, first: &str, rest: &str) -> String {
-    wrap(text, COLUMNS, first, rest)
+pub fn wrapped(text: &str, columns: usize, first: &str, rest: &str) -> String {
+    wrap(text, columns, first, rest)
 }
 
 /// At most 20 lines, the verdict and the report's path last.
@@ -47,7 +47,7 @@ pub fn full(report: &Report, look: Look, places: Places<'_>) -> String {
     screen.held_out();
     if let Some(choice) = &report.selection {
         screen.heading(words::selection::HEADING);
-        screen.text += &selection(choice);
+        screen.text += &selection(choice, look.columns);
     }
     screen.transforms();
     screen.contact_points();
@@ -61,13 +61,13 @@ pub fn full(report: &Report, look: Look, places: Places<'_>) -> String {
     screen.text.trim_start().to_owned()
 }
 
-/// How a model was chosen, at most 80 columns.
+/// How a model was chosen, at most `columns` wide.
 #[must_use]
-pub fn selection(selection: &Selection) -> String {
+pub fn selection(selection: &Selection, columns: usize) -> String {
     use words::selection::{PASTE, TRIED, saved, summary};
     let mut text = String::new();
     for line in summary(selection) {
-        text += &wrap(&markup_free(&line), COLUMNS, "", "");
+        text += &wrap(&markup_free(&line), columns, "", "");
     }
     let mut table = Table::new(&["<tried", ">left out", ">saved", "<outcome"]);
     for step in &selection.steps {
@@ -79,14 +79,14 @@ pub fn selection(selection: &Selection) -> String {
         ]);
     }
     if !table.is_empty() {
-        text += &wrap(TRIED, COLUMNS, "\n", "");
-        text += &table.plain(COLUMNS);
+        text += &wrap(TRIED, columns, "\n", "");
+        text += &table.plain(columns);
     }
     for step in selection.steps.iter().filter(|s| s.has_remarks()) {
         let line = format!("{}: {}.", step.part.words(), step.ending());
-        text += &wrap(&markup_free(&line), COLUMNS, "- ", "  ");
+        text += &wrap(&markup_free(&line), columns, "- ", "  ");
     }
-    text += &wrap(&markup_free(PASTE), COLUMNS, "\n", "");
+    text += &wrap(&markup_free(PASTE), columns, "\n", "");
     text += &selection.solve;
     text
 }

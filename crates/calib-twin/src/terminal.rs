@@ -21,17 +21,18 @@ const LINES: usize = 24;
 /// Width of the names on the left.
 const LEFT: usize = 15;
 
-/// The summary; `folder`: where the files are.
+/// The summary of so many columns; `folder`: where the files are.
 #[must_use]
-pub fn summary(twin: &Twin, folder: &str) -> String {
-    let mut text = format!(
-        "Twin of {}: {} trials of this session with known truth\n",
+pub fn summary(twin: &Twin, folder: &str, columns: usize) -> String {
+    let title = format!(
+        "Twin of {}: {} trials of this session with known truth",
         twin.robot, twin.trials
     );
+    let mut text = wrapped(&title, columns, "", "  ");
     let mut line = |name: &str, said: &str| {
         // A long name keeps a blank behind it.
         let first = format!("{name:<width$} ", width = LEFT - 1);
-        text += &wrapped(said, &first, &" ".repeat(LEFT));
+        text += &wrapped(said, columns, &first, &" ".repeat(LEFT));
     };
     if let Some(said) = resembles(twin) {
         line("resemblance", &said);
@@ -78,7 +79,7 @@ pub fn summary(twin: &Twin, folder: &str) -> String {
     }
     let mut lines = text.lines().count() + 1;
     for (k, note) in twin.notes.iter().enumerate() {
-        let one = wrapped(&words::note(note), "note: ", "      ");
+        let one = wrapped(&words::note(note), columns, "note: ", "      ");
         if lines + one.lines().count() + usize::from(k + 1 < twin.notes.len()) > LINES {
             let _ = writeln!(text, "note: {} more in twin.html", twin.notes.len() - k);
             break;
@@ -86,11 +87,8 @@ pub fn summary(twin: &Twin, folder: &str) -> String {
         lines += one.lines().count();
         text += &one;
     }
-    let _ = writeln!(
-        text,
-        "See {folder}/twin.html: what this session can and cannot tell"
-    );
-    text
+    let see = format!("See {folder}/twin.html: what this session can and cannot tell");
+    text + &wrapped(&see, columns, "", "  ")
 }
 
 fn is_position(p: &Promise) -> bool {

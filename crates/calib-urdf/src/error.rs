@@ -43,6 +43,8 @@ impl fmt::Display for Place {
 pub enum Problem {
     #[error("cannot be read: {reason}")]
     Unreadable { reason: String },
+    #[error("cannot be read: it is a folder, not a file")]
+    Folder,
     #[error("the file is empty")]
     Empty,
     #[error("the file has {bytes} bytes, more than the {limit} that a URDF may have")]
@@ -200,6 +202,7 @@ impl Problem {
     pub fn remedy(&self) -> &'static str {
         match self {
             Self::Unreadable { .. } => "check the path and that you may read the file",
+            Self::Folder => "name a file in it",
             Self::Empty => "export the URDF again; the copy or download was probably cut off",
             Self::TooLarge { .. } => {
                 "give the URDF itself; meshes and recordings are files of their own"

@@ -7,7 +7,7 @@ use calib_pipeline::ExitCode;
 use clap::Args;
 
 use crate::error::CliError;
-use crate::terminal::emit;
+use crate::terminal::{Console, emit, look};
 
 /// Arguments of `calib apply`.
 #[derive(Debug, Args)]
@@ -38,7 +38,7 @@ pub struct Apply {
 }
 
 /// Applies a result to a target.
-pub fn run(options: &Apply) -> Result<ExitCode, CliError> {
+pub fn run(console: &Console, options: &Apply) -> Result<ExitCode, CliError> {
     let destination = match &options.out {
         Some(out) => Destination::To(out.clone()),
         None if options.in_place => Destination::InPlace,
@@ -54,7 +54,7 @@ pub fn run(options: &Apply) -> Result<ExitCode, CliError> {
     emit(&if options.json {
         calib_apply::json(&applied)?
     } else {
-        calib_apply::text(&applied)
+        calib_apply::text(&applied, look(console.color).columns)
     })?;
     Ok(ExitCode::Accepted)
 }

@@ -6,7 +6,7 @@ use calib_pipeline::ExitCode;
 use clap::Args;
 
 use crate::error::CliError;
-use crate::terminal::emit;
+use crate::terminal::{Console, emit, look};
 
 /// Arguments of `calib drift`.
 #[derive(Debug, Args)]
@@ -21,12 +21,12 @@ pub struct Drift {
 }
 
 /// Compares two calibrations.
-pub fn run(options: &Drift) -> Result<ExitCode, CliError> {
+pub fn run(console: &Console, options: &Drift) -> Result<ExitCode, CliError> {
     let drift = calib_drift::drift(&options.old, &options.new)?;
     emit(&if options.json {
         calib_drift::json(&drift)?
     } else {
-        calib_drift::text(&drift)
+        calib_drift::text(&drift, look(console.color).columns)
     })?;
     Ok(match (drift.undecided, drift.changed) {
         (Some(_), _) => ExitCode::NotObservable,

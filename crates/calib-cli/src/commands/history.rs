@@ -7,7 +7,7 @@ use calib_pipeline::ExitCode;
 use clap::Args;
 
 use crate::error::CliError;
-use crate::terminal::{Console, emit, emit_written};
+use crate::terminal::{Console, emit, emit_written, look};
 
 /// Arguments of `calib history`.
 #[derive(Debug, Args)]
@@ -29,7 +29,7 @@ pub fn run(console: &Console, options: &History) -> Result<ExitCode, CliError> {
     emit(&if options.json || console.json {
         calib_drift::history_json(&history)?
     } else {
-        calib_drift::history_text(&history)
+        calib_drift::history_text(&history, look(console.color).columns)
     })?;
     if let Some(out) = &options.out {
         let name = out.file_name().unwrap_or_default().to_string_lossy();

@@ -21,7 +21,7 @@ use calib_urdf::RobotModel;
 use clap::Args;
 
 use crate::error::CliError;
-use crate::terminal::{Console, emit, spinner};
+use crate::terminal::{Console, emit, look, spinner};
 
 /// Arguments of `calib init`.
 #[derive(Debug, Args)]
@@ -203,7 +203,10 @@ fn said(
             calib_report::json::pretty(&json) + "\n"
         }
         (false, true) => format!("{shown}\n"),
-        (false, false) => terminal::summary(proposal, edited, &shown, &findings),
+        (false, false) => {
+            let columns = look(console.color).columns;
+            terminal::summary(proposal, edited, &shown, &findings, columns)
+        }
     })?;
     Ok(code)
 }

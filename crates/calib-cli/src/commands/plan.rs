@@ -10,7 +10,7 @@ use clap::{Args, ValueEnum};
 
 use super::plugin_options::PluginOptions;
 use crate::error::CliError;
-use crate::terminal::{Console, emit, say_stage, spinner};
+use crate::terminal::{Console, emit, look, say_stage, spinner};
 
 /// Arguments of `calib plan`.
 #[derive(Debug, Args)]
@@ -124,7 +124,10 @@ pub fn run(console: &Console, options: &PlanPostures) -> Result<ExitCode, CliErr
     emit(&match (console.json, console.quiet) {
         (true, _) => plan.json(model)?,
         (false, true) => format!("{}\n", out.join("plan.csv").display()),
-        (false, false) => terminal::summary(&plan, &out.display().to_string()),
+        (false, false) => {
+            let columns = look(console.color).columns;
+            terminal::summary(&plan, &out.display().to_string(), columns)
+        }
     })?;
     Ok(ExitCode::Accepted)
 }

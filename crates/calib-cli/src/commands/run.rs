@@ -78,7 +78,7 @@ pub fn run(console: &Console, options: &Run) -> Result<ExitCode, CliError> {
         emit(&if options.json {
             calib_report::json::selection_json(&chosen)?
         } else {
-            calib_report::terminal::selection(&chosen)
+            calib_report::terminal::selection(&chosen, look(console.color).columns)
         })?;
         return Ok(ExitCode::Accepted);
     }

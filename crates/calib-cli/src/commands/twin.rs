@@ -13,7 +13,7 @@ use super::plan_file::plan_of;
 use super::plugin_options::PluginOptions;
 use super::shard_options::{Making, ShardOptions, identity, make};
 use crate::error::CliError;
-use crate::terminal::{Console, Counted, emit};
+use crate::terminal::{Console, Counted, emit, look};
 
 /// Arguments of `calib twin`.
 #[derive(Debug, Args)]
@@ -135,7 +135,10 @@ pub fn run(console: &Console, options: &TwinArguments) -> Result<ExitCode, CliEr
     emit(&match (console.json, console.quiet) {
         (true, _) => write::json(&found)?,
         (false, true) => terminal::line(&found),
-        (false, false) => terminal::summary(&found, &out.display().to_string()),
+        (false, false) => {
+            let columns = look(console.color).columns;
+            terminal::summary(&found, &out.display().to_string(), columns)
+        }
     })?;
     Ok(ExitCode::Accepted)
 }

@@ -22,7 +22,7 @@ super::topic! {
             "Drifts by {drift} within the hold at {time:s}; noise explains {limit}.",
             "Wait longer before each hold, or stiffen the robot's stand.";
         "holds": Warning,
-            "{restless} of {holds:hold} had not settled and were rejected.[[ `{name}` drifts by {drift} at {time:s}.]][[ `{name}` scatters by {scatter}; {usual} is usual.]]",
+            "{restless} of {holds:hold} had not settled and were excluded.[[ `{name}` drifts by {drift} at {time:s}.]][[ `{name}` scatters by {scatter}; {usual} is usual.]]",
             "Wait longer before each hold, or stiffen the robot's stand.";
         "holds_kept": Warning,
             "{restless} of {holds:hold} had not settled, too many to reject.[[ `{name}` drifts by {drift} at {time:s}.]][[ `{name}` scatters by {scatter}; {usual} is usual.]]",

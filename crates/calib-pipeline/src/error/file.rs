@@ -69,6 +69,11 @@ impl UnreadFile {
         let first = match (&self.why, &self.meant) {
             (WhyUnread::Folder, _) => "name a file in it.".to_owned(),
             (_, Some(near)) => format!("did you mean `{near}`?"),
+            (WhyUnread::Io(e), None)
+                if e.kind() == ErrorKind::NotFound && self.path.contains('\\') =>
+            {
+                "correct the path: write `/` between folders, on Windows too.".to_owned()
+            }
             (WhyUnread::Io(e), None) => match e.kind() {
                 ErrorKind::NotFound => "correct the path.",
                 ErrorKind::PermissionDenied => "grant read permission.",

@@ -280,14 +280,30 @@ pub fn correct(inputs: &mut Inputs, fit: &MlFit) {
     }
 }
 
-/// The report's answer to "did the clocks agree?", recording by recording.
+/// Whether a finding says that joint values and tracker data of a recording are not of the same time.
+fn is_off(findings: &[Finding], recording: &str) -> bool {
+    // Readings of one joint that are late are no clock.
+    let of_joint = |f: &Finding| matches!(f.subject.about, About::Joint(_));
+    let lag = |f: &&Finding| f.id == catalog::CLOCK_LAG && !of_joint(f);
+    let mut lags = findings.iter().filter(lag);
+    let named = |f: &Finding| {
+        let of = &f.subject.recordings;
+        of.is_empty() || of.iter().any(|name| name == recording)
+    };
+    let mut missing = findings.iter().filter(|f| f.id == catalog::MISSING_PHYSICS);
+    lags.any(named)
+        || missing.any(|f| f.facts.get("recording").and_then(Fact::word) == Some(recording))
+}
+
+/// The report's answer to "did the clocks agree?", recording by recording; what a finding says of them is not contradicted.
 #[must_use]
-pub fn clocks(inputs: &Inputs, fit: Option<&MlFit>) -> Vec<Clock> {
+pub fn clocks(inputs: &Inputs, fit: Option<&MlFit>, findings: &[Finding]) -> Vec<Clock> {
     let untimed = inputs
         .recordings
         .values()
         .all(|r| r.poses.t.is_none() && r.alignment.is_none());
-    if untimed {
+    let any_off = || inputs.recordings.keys().any(|r| is_off(findings, r));
+    if untimed && !any_off() {
         return vec![Clock {
             recording: "all".to_owned(),
             clock: "tracker".to_owned(),
@@ -302,18 +318,23 @@ pub fn clocks(inputs: &Inputs, fit: Option<&MlFit>) -> Vec<Clock> {
         .recordings
         .values()
         .map(|r| {
-            aligned_clock(r, fit).unwrap_or_else(|| {
-                let check = if r.poses.t.is_none() {
-                    ClockCheck::NotNeeded
-                } else {
-                    ClockCheck::NotTested
+            let off = is_off(findings, &r.name);
+            aligned_clock(r, fit, off).unwrap_or_else(|| {
+                let check = match (off, r.poses.t.is_none()) {
+                    (true, _) => ClockCheck::Noticed,
+                    (false, true) => ClockCheck::NotNeeded,
+                    (false, false) => ClockCheck::NotTested,
                 };
                 Clock {
                     recording: r.name.clone(),
                     clock: "tracker".to_owned(),
                     against: "joints".to_owned(),
                     check,
-                    agrees: (check == ClockCheck::NotNeeded).then_some(true),
+                    agrees: match check {
+                        ClockCheck::Noticed => Some(false),
+                        ClockCheck::NotNeeded => Some(true),
+                        _ => None,
+                    },
                     text: check.text().to_owned(),
                     ..Clock::default()
                 }
@@ -342,7 +363,7 @@ fn estimated(r: &Loaded, clock: &ClockEstimate) -> String {
 }
 
 /// The clocks of a recording whose rows were made from streams.
-fn aligned_clock(r: &Loaded, fit: Option<&MlFit>) -> Option<Clock> {
+fn aligned_clock(r: &Loaded, fit: Option<&MlFit>, off: bool) -> Option<Clock> {
     let alignment = r.alignment.as_ref()?;
     let estimate = clock_estimate(r, fit);
     let mut text = alignment.text();
@@ -360,7 +381,7 @@ fn aligned_clock(r: &Loaded, fit: Option<&MlFit>) -> Option<Clock> {
         sigma_s: estimate.and_then(|c| c.sigma),
         drift: estimate.map(|c| c.drift),
         drift_sigma: estimate.and_then(|c| c.drift_sigma),
-        agrees: Some(true),
+        agrees: Some(!off),
         text,
     })
 }

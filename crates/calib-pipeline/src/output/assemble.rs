@@ -57,7 +57,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
     }
     let findings = findings(e, &missing, open);
     let joint_sigma = e.fit.and_then(MlFit::joint_sigma).unwrap_or(0.0);
-    let motions = motions(e.inputs, joint_sigma);
+    let motions = motions(e.inputs, joint_sigma, e.held_out);
     let tracks = fates(e.inputs, e.tracks, e.fit, e.held_out);
     let limits = limits(&profile.solve.limits, e);
     let (judgment, residuals) = rayon::join(
@@ -98,7 +98,7 @@ pub fn assemble(e: &Evidence<'_>) -> Report {
         noise_choice: e.fit.and_then(noise_choice),
         prior_widths: e.fit.map_or_else(Vec::new, prior_widths),
         tested_effects: goodness.map_or_else(Vec::new, tested_effects),
-        clocks: crate::formulate::clock::clocks(e.inputs, e.fit),
+        clocks: crate::formulate::clock::clocks(e.inputs, e.fit, &findings),
         recordings: recordings(e.inputs, &tracks),
         coverage: coverage(e.inputs),
         rejected: rejected(e.inputs, e.fit, e.held_out),

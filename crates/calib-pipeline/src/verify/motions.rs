@@ -1,7 +1,9 @@
 //! Where the joints were: what the fitted recordings move, and what the held-out poses can verify of it.
 
+use std::collections::BTreeSet;
+
 use calib_profile::Usage;
-use calib_report::UnseenBody;
+use calib_report::{HeldOut, UnseenBody};
 use calib_urdf::JointId;
 
 use crate::prepare::inputs::{self, Inputs, Loaded};
@@ -30,7 +32,7 @@ pub(crate) struct Motions {
     pub(crate) still: Vec<String>,
     /// Bodies that the fitted recordings show and no held-out pose does.
     pub(crate) unseen: Vec<UnseenBody>,
-    /// Held-out postures.
+    /// Held-out postures with an error that counts: what was rejected or lost verifies nothing.
     pub(crate) postures: usize,
     /// Those with a joint beyond the fitted range.
     pub(crate) outside: usize,
@@ -38,8 +40,8 @@ pub(crate) struct Motions {
     pub(crate) repeated: usize,
 }
 
-/// Of all recordings; `joint_sigma` is the noise of the readings that was found, rad.
-pub(crate) fn motions(inputs: &Inputs, joint_sigma: f64) -> Motions {
+/// Of all recordings; `joint_sigma` is the noise of the readings that was found, rad, `verified` the errors that were measured on held-out poses.
+pub(crate) fn motions(inputs: &Inputs, joint_sigma: f64, verified: Option<&HeldOut>) -> Motions {
     let model = &inputs.robot.model;
     let of = |validation: bool| -> Vec<&Loaded> {
         let recordings = inputs.recordings.values();
@@ -57,6 +59,7 @@ pub(crate) fn motions(inputs: &Inputs, joint_sigma: f64) -> Motions {
         .collect();
     let joints: Vec<JointId> = moved.iter().map(|(joint, _)| *joint).collect();
     let held_out_rows = rows(&held_out);
+    let verified_rows = with_errors(&held_out, verified);
     let one_by_one = |recordings: &[&Loaded]| {
         joints.len() > 1
             && recordings.iter().any(|r| r.q.iter().flatten().count() > 1)
@@ -97,10 +100,10 @@ pub(crate) fn motions(inputs: &Inputs, joint_sigma: f64) -> Motions {
             still.collect()
         },
         unseen,
-        postures: held_out_rows.len(),
-        outside: held_out_rows.iter().filter(beyond).count(),
+        postures: verified_rows.len(),
+        outside: verified_rows.iter().filter(beyond).count(),
         repeated: repeated(
-            &held_out_rows,
+            &verified_rows,
             rows(&fitted),
             &model.independent_joints().collect::<Vec<_>>(),
             &|joint| SAME.max(WITHIN * joint_sigma) * scales[joint.index()],
@@ -110,6 +113,21 @@ pub(crate) fn motions(inputs: &Inputs, joint_sigma: f64) -> Motions {
 
 fn rows<'a>(recordings: &[&'a Loaded]) -> Vec<&'a Vec<f64>> {
     let rows = recordings.iter().flat_map(|r| r.q.iter().flatten());
+    rows.collect()
+}
+
+/// Joint positions of the held-out rows that have an error that counts.
+fn with_errors<'a>(held_out: &[&'a Loaded], verified: Option<&HeldOut>) -> Vec<&'a Vec<f64>> {
+    let errors = verified.into_iter().flat_map(|verified| &verified.poses);
+    let counted = errors.filter(|error| !error.screened);
+    let counted: BTreeSet<&str> = counted.map(|error| error.pose.as_str()).collect();
+    let rows = held_out.iter().flat_map(|r| {
+        let label = |row: usize| format!("{}:{}", r.name, r.poses.rows[row]);
+        let rows = r.q.iter().enumerate();
+        rows.filter(|(row, _)| counted.contains(label(*row).as_str()))
+            .filter_map(|(_, q)| q.as_ref())
+            .collect::<Vec<_>>()
+    });
     rows.collect()
 }
 

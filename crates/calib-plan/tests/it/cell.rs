@@ -70,7 +70,7 @@ fn planned(known: &Known, poses: usize) -> Plan {
 }
 
 fn screen(plan: &Plan) -> String {
-    let screen = terminal::summary(plan, "out");
+    let screen = terminal::summary(plan, "out", 80);
     assert!(screen.lines().count() <= 24, "{screen}");
     let words: Vec<&str> = screen.split_whitespace().collect();
     words.join(" ")

@@ -385,7 +385,7 @@ fn what_is_written_is_read_back_and_another_robot_refuses_it() {
             .to_string()
             .contains("j5_deg")
     );
-    let lines = terminal::summary(&found, "out").lines().count();
+    let lines = terminal::summary(&found, "out", 80).lines().count();
     assert!(lines <= 24, "{lines}");
 }
 
@@ -676,7 +676,7 @@ fn surroundings_that_nothing_is_compared_with_come_first_among_the_notes() {
     let first = plan.notes.first();
     let is_first = matches!(first, Some(Note::SurroundingsUnchecked { .. }));
     assert!(is_first, "{:?}", plan.notes);
-    let screen = terminal::summary(&plan, "out");
+    let screen = terminal::summary(&plan, "out", 80);
     let words: Vec<&str> = screen.split_whitespace().collect();
     let said = words.join(" ");
     for part in [
@@ -697,7 +697,7 @@ fn surroundings_that_nothing_is_compared_with_come_first_among_the_notes() {
             *links = (0..40).map(|k| format!("link_{k}")).collect();
         }
     }
-    let screen = terminal::summary(&many, "out");
+    let screen = terminal::summary(&many, "out", 80);
     let words: Vec<&str> = screen.split_whitespace().collect();
     let (said, first) = (
         words.join(" "),

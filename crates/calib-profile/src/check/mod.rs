@@ -6,7 +6,7 @@ use calib_files::{NameFault, check_name};
 use calib_urdf::{JointId, JointKind, LinkId, RobotModel};
 use nalgebra::{Isometry3, Point3, Translation3, Unit, Vector3};
 
-use crate::error::{Problem, ProfileError, expected, one_of};
+use crate::error::{Problem, ProfileError, escaped, expected, one_of};
 use crate::locate::{Place, Places};
 use crate::profile::{FromRoot, Outputs, Profile, Tracker};
 use crate::raw::{RawFree, RawFromRoot, RawPose, RawProfile};
@@ -44,7 +44,9 @@ pub fn check(
         ));
     }
     let places = Places::of(text);
-    let hidden: Vec<Problem> = places.hidden().into_iter().map(hides).collect();
+    let hidden = places.hidden().into_iter();
+    let hidden = hidden.map(|hidden| escaped(text, hidden.0).unwrap_or_else(|| hides(hidden)));
+    let hidden: Vec<Problem> = hidden.collect();
     if !hidden.is_empty() {
         return Err(ProfileError::new(file, text, hidden));
     }

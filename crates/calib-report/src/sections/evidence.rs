@@ -3,7 +3,7 @@
 use super::{Page, code, mm};
 use crate::table::Table;
 use crate::words;
-use crate::{NoiseChoice, PriorWidth, Report, TestedEffect, Unit, number};
+use crate::{NoiseChoice, PriorWidth, RecordingSummary, Report, TestedEffect, Unit, number};
 
 /// Row numbers shown in a table cell; the rest is counted.
 const ROWS: usize = 8;
@@ -29,8 +29,10 @@ fn recordings(page: &mut Page, report: &Report) {
         "<recording",
         "<for",
         ">rows",
-        ">used",
+        ">rows used",
         ">rows rejected",
+        ">rows excluded",
+        ">rows lost",
         "<lost by the tracker",
     ]);
     for recording in &report.recordings {
@@ -41,12 +43,23 @@ fn recordings(page: &mut Page, report: &Report) {
             .collect();
         let [rows, used, rejected] =
             [recording.rows, recording.used, recording.rejected].map(|n| n.to_string());
+        // Empty where there is none in any recording: the column goes.
+        let [excluded, rows_lost] = [
+            |r: &RecordingSummary| r.excluded,
+            |r: &RecordingSummary| r.rows_lost,
+        ]
+        .map(|of| match report.recordings.iter().all(|r| of(r) == 0) {
+            true => String::new(),
+            false => of(recording).to_string(),
+        });
         table.row([
             code(&recording.name),
             recording.used_for.word().to_owned(),
             rows,
             used,
             rejected,
+            excluded,
+            rows_lost,
             if lost.is_empty() {
                 "none".to_owned()
             } else {
@@ -205,21 +218,23 @@ fn noise_choice(page: &mut Page, choice: &NoiseChoice) {
 }
 
 fn rejected(page: &mut Page, report: &Report) {
-    let mut table = Table::new(&["<recording", "<subject", "<rows", "<reason"]);
-    for rejected in &report.rejected {
-        let what = if rejected.subject.is_empty() {
-            "whole row".to_owned()
-        } else {
-            code(&rejected.subject)
+    let mut table = Table::new(&["<recording", "<subject", "<rows", "<what", "<reason"]);
+    for together in words::rejection::together(report) {
+        let rejected = together.rejected;
+        let names = together.subjects.iter().map(|name| code(name));
+        let what = match together.subjects.as_slice() {
+            [] => "whole row".to_owned(),
+            _ => names.collect::<Vec<_>>().join(", "),
         };
         table.row([
             code(&rejected.recording),
             what,
             rows(&rejected.rows),
+            rejected.cause.stage().to_owned(),
             rejected.reason.clone(),
         ]);
     }
-    page.table("Rejected from the fit:", table);
+    page.table("Rejected and excluded:", table);
 }
 
 fn findings(page: &mut Page, report: &Report) {
@@ -331,6 +346,14 @@ pub(super) fn files(page: &mut Page, report: &Report) {
     ] {
         if !commands.is_empty() {
             page.section(id, title);
+            let place = match id {
+                "how-to-reproduce" => words::files::writes_to(report)
+                    .map(|line| format!("In the folder of the profile. {line}")),
+                _ => Some("In the folder of the results.".to_owned()),
+            };
+            if let Some(place) = place {
+                page.text(place);
+            }
             page.code("sh", &commands.join("\n"));
         }
     }

@@ -3,8 +3,8 @@
 use crate::{Report, Verdict, words};
 use anstyle::{AnsiColor, Style};
 
-/// Columns of the narrowest terminal in use.
-pub(super) const COLUMNS: usize = 80;
+/// Columns of a terminal whose width is not known.
+pub const COLUMNS: usize = 80;
 
 /// How a terminal shows text.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,7 +1,7 @@
 //! What fits a screen of 24 rows: at most [`ROWS`] lines, the verdict and the report's path last.
 
 use super::look::{Look, Places, painted, verdict_style};
-use crate::table::{clip, wrap};
+use crate::table::wrap;
 use crate::words::headline::{Headline, headline, steps};
 use crate::words::prose::sentence;
 use crate::words::remarks::{Remark, remarks};
@@ -53,7 +53,7 @@ fn head(report: &Report, look: Look) -> Vec<String> {
         report.method.name(),
         report.version
     );
-    let mut out = vec![clip(&printable_line(&title), look.columns)];
+    let mut out = lines(&printable_line(&title), look, "", "  ");
     let number = headline(report);
     out.extend(lines(&first_line(&number), look, "", "  "));
     let all: Vec<String> = steps(report)

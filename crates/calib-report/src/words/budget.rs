@@ -77,13 +77,14 @@ pub(crate) fn coverage(budget: &Budget) -> String {
     text
 }
 
-/// `26`, or `∞` for what is taken as exactly known.
+/// `26`, `∞` for what is taken as exactly known, `< 1` for a small difference of large numbers.
 pub(crate) fn freedom(freedom: Option<f64>) -> String {
     freedom.map_or_else(
         || "∞".to_owned(),
-        |nu| match nu < 10.0 {
-            true => number::fixed(nu, 1),
-            false => number::fixed(nu, 0),
+        |nu| match nu {
+            ..1.0 => "< 1".to_owned(),
+            ..10.0 => number::fixed(nu, 1),
+            _ => number::fixed(nu, 0),
         },
     )
 }
@@ -91,4 +92,17 @@ pub(crate) fn freedom(freedom: Option<f64>) -> String {
 /// The heads of the table: text of the units in the last two columns.
 pub(crate) fn caption(report: &Report) -> String {
     format!("Uncertainty budget of {}:", code(&report.robot))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn degrees_of_freedom_are_never_none_at_all() {
+        assert_eq!(freedom(None), "∞");
+        assert_eq!(freedom(Some(0.02)), "< 1");
+        assert_eq!(freedom(Some(3.21)), "3.2");
+        assert_eq!(freedom(Some(26.4)), "26");
+    }
 }

@@ -13,6 +13,9 @@ impl ClockCheck {
                 "joints and tracker share the rows of one table; their offset was not tested"
             }
             Self::Aligned => "the streams were aligned",
+            Self::Noticed => {
+                "a finding says that joint values and tracker data of its rows are not of the same time"
+            }
         }
     }
 }
@@ -22,6 +25,7 @@ impl Clock {
         let verdict = match (self.check, self.agrees) {
             (ClockCheck::NotNeeded, _) => "not needed",
             (_, Some(true)) => "yes",
+            (ClockCheck::Aligned, Some(false)) => "no, but they were aligned by the motion",
             (_, Some(false)) => "no",
             (_, None) => "not tested",
         };
@@ -51,4 +55,27 @@ pub(crate) fn clocks(report: &Report, rest: &str) -> Vec<String> {
         short(&lines, rest),
         "Not compared: no recording has two clocks.",
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn clocks_that_a_finding_says_are_apart_were_not_synchronized() {
+        let of = |check, agrees| {
+            let clock = Clock {
+                check,
+                agrees,
+                ..Clock::default()
+            };
+            clock.sentence()
+        };
+        assert_eq!(
+            of(ClockCheck::Aligned, Some(false)),
+            "no, but they were aligned by the motion."
+        );
+        assert_eq!(of(ClockCheck::Aligned, Some(true)), "yes.");
+        assert_eq!(of(ClockCheck::Noticed, Some(false)), "no.");
+    }
 }

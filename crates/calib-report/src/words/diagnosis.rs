@@ -18,6 +18,7 @@ impl Diagnosis {
                 limit_m,
                 tracker_m,
                 from_residuals,
+                above_stated,
             } => {
                 let [limit, tracker] = [limit_m, tracker_m].map(|m| number::plain(*m, Unit::Meter));
                 let enough = (ROOM * tracker_m * 1e4).ceil() / 10.0;
@@ -28,6 +29,17 @@ impl Diagnosis {
                         ),
                         format!(
                             "State the noise of the tracker, `tracker: {{body_sigma_mm: …, body_sigma_deg: …}}`, so that the fit shows what exceeds it; only if the tracker is that noisy, set `solve.limits.{limit_name}` to {enough} or more. Then run `{again}`."
+                        ),
+                    ];
+                }
+                if let Some(factor) = above_stated {
+                    return [
+                        format!(
+                            "The tracker is {} times as noisy as the profile states: the noise of one measurement, {tracker}, is above the limit of {limit}, which no robot can meet so.",
+                            number::fixed(*factor, 1)
+                        ),
+                        format!(
+                            "Find out why (the tracker's calibration, reflections, loose markers) and record again. If the tracker is that noisy, state its noise in `tracker`, and set `solve.limits.{limit_name}` to {enough} or more, or average several frames per pose. Then run `{again}`."
                         ),
                     ];
                 }
@@ -88,7 +100,25 @@ impl Diagnosis {
                     ),
                 },
             ],
-            Self::TooFewPoses { postures, fitted } => [
+            Self::TooFewPoses {
+                tracker_m: Some(tracker_m),
+                postures,
+                ..
+            } => [
+                format!(
+                    "The error is so near its limit that these poses do not decide, and most of it is the noise of one tracker measurement, {}.",
+                    number::plain(*tracker_m, Unit::Meter)
+                ),
+                format!(
+                    "Average several frames per pose, which lowers that noise, or set a larger limit, then run `{again}`.{}",
+                    postures.map_or_else(String::new, |n| format!(
+                        " This limit would need about {n} validation postures."
+                    ))
+                ),
+            ],
+            Self::TooFewPoses {
+                postures, fitted, ..
+            } => [
                 "There are too few poses to decide whether the limit is met.".to_owned(),
                 match postures {
                     Some(n) if *fitted => format!(

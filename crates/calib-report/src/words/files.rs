@@ -33,12 +33,22 @@ pub(crate) fn reproduce(report: &Report) -> Vec<String> {
         .map(|command| format!("In the folder of the profile: {command}"))
         .collect();
     let mut lines = or(again, "Run the same profile again.");
+    lines.extend(writes_to(report));
     lines.push(format!(
         "{}; {} identified by SHA-256 below.",
         version(report),
         counted(report.inputs.len(), "input")
     ));
     lines
+}
+
+/// Where the command to reproduce writes: the place of this report is no part of it, so that equal runs give equal reports.
+pub(crate) fn writes_to(report: &Report) -> Option<String> {
+    let name = std::path::Path::new(&report.profile).file_stem()?;
+    let folder = code(&format!("results/{}", name.to_string_lossy()));
+    Some(format!(
+        "It writes to {folder} there; add `--out FOLDER` to write elsewhere."
+    ))
 }
 
 /// Commands that run where the results are.

@@ -1,7 +1,7 @@
 //! How the solver ended.
 
 use super::prose::counted;
-use super::rejection::rejected_of;
+use super::rejection::{excluded_of, rejected_of};
 use crate::{FitEnd, FitSummary, Report, Unit, number};
 
 impl FitEnd {
@@ -54,6 +54,9 @@ pub(crate) fn in_short(report: &Report) -> String {
         fit.and_then(chi2),
         all.map(|all| format!("rms residual {}", number::plain(all.rms_m, Unit::Meter))),
         rejected.map(|[part, of]| format!("{part} of {of} measurements rejected")),
+        Some(excluded_of(report))
+            .filter(|n| *n > 0)
+            .map(|n| format!("{n} excluded before the fit")),
     ];
     let parts: Vec<String> = parts.into_iter().flatten().collect();
     match parts.is_empty() {

@@ -27,6 +27,20 @@ impl RejectedFor {
             Self::Unstated => "rejected",
         }
     }
+
+    /// At which stage they were taken out, as a participle: what a count of rejected measurements includes, and what it does not.
+    pub(crate) fn stage(self) -> &'static str {
+        match self {
+            Self::OnTheWay | Self::RestlessHold | Self::HeldReadings | Self::StuckReading => {
+                "excluded before the fit"
+            }
+            Self::NotSettled | Self::Occlusion | Self::Outlier | Self::Swap => {
+                "rejected by the fit"
+            }
+            Self::Screened => "screened out of the held-out errors",
+            Self::Unstated => "rejected",
+        }
+    }
 }
 
 impl Rejected {

@@ -250,6 +250,13 @@ fn of_rejection(reason: &Reason, v: &Values<'_>) -> String {
                     v.number("from"),
                     v.number("to")
                 )
+            } else if let Some(Fact::Names(subjects)) = v.get("subjects") {
+                let subjects: Vec<String> = subjects.iter().map(|name| code(name)).collect();
+                format!(
+                    "of the measurements of {} in recording {}",
+                    subjects.join(", "),
+                    v.code("recording")
+                )
             } else if v.get("subject").is_some() {
                 format!(
                     "of the measurements of {} in recording {}",
@@ -260,10 +267,12 @@ fn of_rejection(reason: &Reason, v: &Values<'_>) -> String {
                 format!("of the measurements of recording {}", v.code("recording"))
             };
             let share = v.share("rejected", "of");
-            format!("{share} {what} were rejected: the model does not fit this part of the data.")
+            format!(
+                "{share} {what} were excluded before the fit or rejected by it: the model does not fit this part of the data."
+            )
         }
         ReasonId::RejectedShare => format!(
-            "{} fitted measurements were rejected.",
+            "{} measurements of the fitted recordings were excluded before the fit or rejected by it.",
             v.share("rejected", "of")
         ),
         _ => format!(

@@ -136,6 +136,22 @@ fn hostile_names_stay_text() {
     assert!(!text.contains("<img"), "markup got through");
 }
 
+/// On a narrow screen tables and code scroll; a shadow at the edge shows that there is more.
+#[test]
+fn what_scrolls_is_seen_to_scroll() {
+    let text = html(&examples::accepted(), None).expect("a page");
+    let style = text.split("</style>").next().expect("a style");
+    let rule = style.split(".scroll, pre {").nth(1).expect("a rule");
+    let rule = rule.split('}').next().expect("its end");
+    // The covers move with the content, the shadows stay.
+    assert_eq!(rule.matches("no-repeat local").count(), 2, "{rule}");
+    assert_eq!(rule.matches("no-repeat scroll").count(), 2, "{rule}");
+    let tables = text.matches("<table").count();
+    let scrolled = text.matches("<div class=\"scroll\"").count();
+    assert!(tables > 0);
+    assert_eq!(scrolled, tables, "a table stands outside of what scrolls");
+}
+
 #[test]
 fn a_report_without_a_view_has_no_script() {
     let text = html(&examples::rejected(), None).expect("a page");

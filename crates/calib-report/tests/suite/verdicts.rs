@@ -840,3 +840,89 @@ fn an_open_error_far_below_the_limit_is_no_reason() {
     assert!(!of(0.015 * limit).1);
     assert!(of(0.03 * limit).1);
 }
+
+/// A body whose pose was wrong is one part of the data, however many markers it has.
+#[test]
+fn markers_of_a_recording_that_were_rejected_together_are_one_reason() {
+    let of = |subjects: &[&str]| {
+        let part = |subject: &&str| RejectedPart {
+            part: Part::Subject {
+                recording: "poses".into(),
+                subject: (*subject).into(),
+            },
+            rejected: Share { part: 27, of: 40 },
+        };
+        let facts = with(|f| f.rejected_parts = subjects.iter().map(part).collect());
+        let reasons = judge(&facts).reasons;
+        let reasons = reasons.iter().filter(|r| r.id == ReasonId::RejectedPart);
+        reasons.map(Reason::sentence).collect::<Vec<_>>()
+    };
+    assert_eq!(
+        of(&["hand_1", "hand_2", "hand_3"]),
+        [
+            "81 of 120 (68 %) of the measurements of `hand_1`, `hand_2`, `hand_3` in recording `poses` were excluded before the fit or rejected by it: the model does not fit this part of the data."
+        ]
+    );
+    assert_eq!(of(&["hand_1"]).len(), 1);
+}
+
+/// Markers that scatter about their own bodies as much as about the robot show the tracker's noise, whatever was stated.
+#[test]
+fn a_limit_below_the_noise_that_the_bodies_show_is_called_that() {
+    let of = |rigid: Option<f64>| {
+        let limit = Limit::compared(
+            Limited::position_rms(false),
+            0.0015,
+            0.00266,
+            Some((0.0024, 0.0029)),
+        );
+        let facts = with(|f| {
+            f.limits = vec![limit.clone()];
+            let goodness = f.goodness.as_mut().expect("a goodness of fit");
+            goodness.above_stated = Some(found(5.0, rigid));
+        });
+        let marker = calib_report::Noise {
+            kind: calib_report::NoiseKind::Position,
+            sigma: Some(0.0015),
+            stated: Some(0.0003),
+            ..calib_report::Noise::default()
+        };
+        let held_out = calib_report::HeldOut {
+            postures: 20,
+            expected: Some(calib_report::ExpectedError {
+                rms_m: 0.00266,
+                tracker_m: Some(0.00265),
+                ..calib_report::ExpectedError::default()
+            }),
+            ..calib_report::HeldOut::default()
+        };
+        let report = calib_report::Report {
+            limits: vec![limit],
+            noise: vec![marker],
+            verification: calib_report::Verification {
+                held_out: Some(held_out),
+                ..calib_report::Verification::default()
+            },
+            ..calib_report::Report::default()
+        };
+        report.judged(judge(&facts))
+    };
+    let noisy = of(Some(5.0));
+    let look = calib_report::terminal::Look::default();
+    let places = calib_report::terminal::Places::default();
+    let screen = calib_report::terminal::summary(&noisy, look, places);
+    let screen = screen.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        screen.contains("The tracker is 5.0 times as noisy as the profile states"),
+        "{screen}"
+    );
+    assert!(
+        screen.contains("set `solve.limits.held_out_rms_mm` to 4 or more"),
+        "{screen}"
+    );
+    // Residuals alone are also what the model lacks.
+    assert_eq!(
+        of(None).diagnosis,
+        Some(calib_report::Diagnosis::Unexplained)
+    );
+}

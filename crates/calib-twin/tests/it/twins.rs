@@ -59,7 +59,7 @@ fn a_twin_that_was_stopped_goes_on_to_the_same_bytes_whatever_the_threads() {
         said.contains("the postures of `poses` (recorded or planned)"),
         "{said}"
     );
-    let screen = terminal::summary(&whole, "out");
+    let screen = terminal::summary(&whole, "out", 80);
     assert!(screen.lines().count() <= 24, "{screen}");
     let schema = write::json_schema();
     let of = schema["properties"].as_object().expect("properties");

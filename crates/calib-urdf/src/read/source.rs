@@ -54,8 +54,11 @@ pub fn decode<'a>(bytes: &'a [u8], name_for_errors: &str) -> Result<&'a str, Rea
 pub fn read_text(path: &Path, name_for_errors: &str) -> Result<String, ReadError> {
     let whole_file = |problem| ReadError::one(name_for_errors, ReadProblem::of_file(problem));
     let unreadable = |error: std::io::Error| {
-        whole_file(Problem::Unreadable {
-            reason: error.to_string(),
+        whole_file(match error.kind() {
+            std::io::ErrorKind::IsADirectory => Problem::Folder,
+            _ => Problem::Unreadable {
+                reason: error.to_string(),
+            },
         })
     };
     let bytes = input::read(path, MAX_BYTES).map_err(|error| {

@@ -6,15 +6,19 @@ use crate::verdict::facts::{Facts, Part, RejectedPart, Share, Validation};
 use crate::verdict::{Effect, Reason, ReasonId};
 
 pub(super) fn rejected_parts(facts: &Facts) -> Vec<Reason> {
-    let reason = |rejected: &RejectedPart| {
+    let reason = |(part, share, subjects): &(&Part, Share, Vec<&str>)| {
         let reason = Reason::new(ReasonId::RejectedPart, Effect::Rejects)
-            .with("rejected", Fact::count(rejected.rejected.part))
-            .with("of", Fact::count(rejected.rejected.of));
-        match &rejected.part {
+            .with("rejected", Fact::count(share.part))
+            .with("of", Fact::count(share.of));
+        match part {
             Part::Recording(recording) => reason.with("recording", Fact::name(recording)),
-            Part::Subject { recording, subject } => reason
-                .with("recording", Fact::name(recording))
-                .with("subject", Fact::name(subject)),
+            Part::Subject { recording, subject } => {
+                let reason = reason.with("recording", Fact::name(recording));
+                match subjects.as_slice() {
+                    [_] => reason.with("subject", Fact::name(subject)),
+                    all => reason.with("subjects", Fact::names(all.iter().copied())),
+                }
+            }
             Part::Range {
                 joint,
                 from,
@@ -26,7 +30,28 @@ pub(super) fn rejected_parts(facts: &Facts) -> Vec<Reason> {
                 .with("to", Fact::number(*to, *unit)),
         }
     };
-    facts.rejected_parts.iter().map(reason).collect()
+    together(&facts.rejected_parts).iter().map(reason).collect()
+}
+
+/// The parts, the markers and bodies of a recording as one: what happened to a body happened to each of its markers.
+fn together(parts: &[RejectedPart]) -> Vec<(&Part, Share, Vec<&str>)> {
+    let mut all: Vec<(&Part, Share, Vec<&str>)> = Vec::new();
+    for RejectedPart { part, rejected } in parts {
+        let Part::Subject { recording, subject } = part else {
+            all.push((part, *rejected, Vec::new()));
+            continue;
+        };
+        let same = |of: &&mut (&Part, Share, Vec<&str>)| matches!(of.0, Part::Subject { recording: other, .. } if other == recording);
+        match all.iter_mut().find(same) {
+            Some((_, share, subjects)) => {
+                share.part += rejected.part;
+                share.of += rejected.of;
+                subjects.push(subject);
+            }
+            None => all.push((part, *rejected, vec![subject])),
+        }
+    }
+    all
 }
 
 /// Validation that repeats fitted postures in this share, measured again, proves little about new ones…
