@@ -684,9 +684,9 @@ fn backslashes_and_tabs_in_a_profile() {
             "`ripley/base_sweep.csv`",
         ),
         (
-            "file: \"C:\\Users\\base_sweep.csv\"",
+            "file: \"D:\\data\\base_sweep.csv\"",
             "`\\` begins an escape",
-            "`C:/Users/base_sweep.csv`",
+            "`D:/data/base_sweep.csv`",
         ),
         (
             "file: \"ripley\\table.csv\"",

@@ -195,7 +195,7 @@ fn one_line_and_all_tables() {
 fn narrow_terminals() {
     let dir = ripley();
     let narrow = [("COLUMNS", "60")];
-    let commands: [(&[&str], i32); 5] = [
+    let commands: [(&[&str], i32); 4] = [
         (&["run", PROFILE, "-o", "out", "--full"], 0),
         (&["drift", "out", "out"], 0),
         (
@@ -209,10 +209,6 @@ fn narrow_terminals() {
                 "-o",
                 "plan",
             ],
-            0,
-        ),
-        (
-            &["apply", "out", "robots/ripley/r17.urdf", "-o", "new.urdf"],
             0,
         ),
         (&["fit", "cor", "robots/ripley/base_sweep.csv"], 3),

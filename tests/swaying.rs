@@ -9,7 +9,12 @@ use scratch::Scratch;
 use serde_json::Value;
 
 const PROFILE: &str = "robots/ripley.yaml";
-const FILES: [&str; 2] = ["robots/ripley/arm_poses.csv", "robots/ripley/checks.csv"];
+const FILES: [&str; 4] = [
+    "robots/ripley/base_sweep.csv",
+    "robots/ripley/wrist_sweep.csv",
+    "robots/ripley/arm_poses.csv",
+    "robots/ripley/checks.csv",
+];
 
 /// A normal number of a row and an axis.
 fn normal(row: usize, axis: usize) -> f64 {
@@ -19,17 +24,17 @@ fn normal(row: usize, axis: usize) -> f64 {
 /// The report of the shipped robot whose markers are moved: by what `motion` says of row and axis, m, where `moves` holds for the marker.
 fn judged(moves: impl Fn(&str) -> bool, motion: impl Fn(usize, usize) -> f64) -> Value {
     let mut dir = Scratch::new().brief("ripley");
-    for file in FILES {
+    for (number, file) in FILES.iter().enumerate() {
         dir = dir.cells(file, |row, column, cell| {
             let coordinate = column.strip_suffix("_m").and_then(|c| c.split_once('.'));
-            let Some((marker, axis)) = coordinate.filter(|(marker, _)| moves(marker)) else {
+            let Some((_, axis)) = coordinate.filter(|(marker, _)| moves(marker)) else {
                 return cell.to_owned();
             };
             let axis = ["x", "y", "z"].iter().position(|a| *a == axis);
             let (Some(axis), Ok(at)) = (axis, cell.parse::<f64>()) else {
                 return cell.to_owned();
             };
-            format!("{:.6}", at + motion(row, axis))
+            format!("{:.6}", at + motion(1000 * number + row, axis))
         });
     }
     let ran = dir.calib(["run", PROFILE, "--out", "out"]);
@@ -46,7 +51,11 @@ fn findings<'a>(report: &'a Value, id: &str) -> Vec<&'a Value> {
 fn a_tracker_that_sways_is_named_by_the_body_that_no_joint_moves() {
     // From row to row, and as one that is carried about.
     let sways = |row: usize, axis: usize| 8e-4 * normal(row, axis);
-    let walks = |row: usize, axis: usize| (0..=row).map(|k| 6e-4 * normal(k, axis)).sum::<f64>();
+    let walks = |row: usize, axis: usize| {
+        (row / 1000 * 1000..=row)
+            .map(|k| 6e-4 * normal(k, axis))
+            .sum::<f64>()
+    };
     for (motion, expected) in [
         (&sways as &dyn Fn(usize, usize) -> f64, Some(1.39e-3)),
         (&walks, None),
@@ -74,7 +83,10 @@ fn a_tracker_that_sways_is_named_by_the_body_that_no_joint_moves() {
 /// One step is a tracker that was moved once; what a body does alone is no tracker's.
 #[test]
 fn nothing_else_is_called_a_tracker_that_sways() {
-    let bump = |row: usize, _: usize| if row >= 25 { 2e-3 } else { 0.0 };
+    let bump = |row: usize, _: usize| match row {
+        2008..3000 => 2e-3,
+        _ => 0.0,
+    };
     let report = judged(|_| true, bump);
     assert!(findings(&report, "tracker-sways").is_empty());
     let changed = findings(&report, "changed-while-recording");

@@ -259,7 +259,6 @@ fn the_report_of_the_tutorial_does_not_contradict_itself() {
     }
     let text = dir.read("out/report.md");
     for said in [
-        "12 measurements of the fitted recordings were excluded before the fit.",
         "12 of 128 (9 %) measurements of the fitted recordings were excluded before the fit or rejected by it.",
         "It writes to `results/arm` there",
         "no, but they were aligned by the motion",

@@ -264,7 +264,7 @@ mod tests {
         assert!(lines.iter().all(|l| l.chars().count() <= 40), "{folded}");
         assert!(folded.contains(quoted), "{folded}");
         assert!(
-            lines.contains(&"    forty columns has room for"),
+            lines.contains(&"    line of forty columns has room for"),
             "{folded}"
         );
     }

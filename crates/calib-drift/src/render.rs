@@ -98,20 +98,19 @@ pub fn text(drift: &Drift, columns: usize) -> String {
         ));
     }
     out += &zeros_not_compared(drift, columns);
-    if !drift.known_in_neither.is_empty() {
-        out.push('\n');
-        out += &terminal::wrapped(
-            &format!(
-                "{} parameters are conventions or not seen by either recording; what both see of their combinations is in the \
-                 test of all at once",
-                drift.known_in_neither.len()
-            ),
-            columns,
-            "",
-            "  ",
-        );
+    out + &known_in_neither(drift, columns)
+}
+
+/// How many parameters neither recording sees.
+fn known_in_neither(drift: &Drift, columns: usize) -> String {
+    if drift.known_in_neither.is_empty() {
+        return String::new();
     }
-    out
+    let line = format!(
+        "{} parameters are conventions or not seen by either recording; what both see of their combinations is in the test of all at once",
+        drift.known_in_neither.len()
+    );
+    format!("\n{}", terminal::wrapped(&line, columns, "", "  "))
 }
 
 /// Over the numbers that changed.

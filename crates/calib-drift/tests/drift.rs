@@ -445,7 +445,7 @@ fn what_a_recording_hardly_sees_is_left_out() {
         (1, 3)
     );
     assert!(!found.changed, "{found:?}");
-    let text = calib_drift::text(&found);
+    let text = calib_drift::text(&found, 80);
     assert!(text.contains("too far for the linear comparison"), "{text}");
 }
 
@@ -470,7 +470,7 @@ fn many_sigmas_of_few_degrees_of_freedom_are_called_not_significant() {
     text.numbers
         .iter_mut()
         .for_each(|n| n.gauge_free = n.name == "elbow.z");
-    let text = calib_drift::text(&text);
+    let text = calib_drift::text(&text, 80);
     let line = text
         .lines()
         .find(|l| l.contains("elbow.z"))

@@ -241,10 +241,8 @@ mod tests {
         assert_eq!(said("{angle}, {angle:rad}"), "−30°, −0.524 rad");
         assert_eq!(said("{rows:row} of {lost:row}"), "1 row of 0 rows");
         assert_eq!(said("{late: {late:yaml-ms}}"), "{late: -12.3}");
-        facts.insert("joints", Fact::names(["j5", "j6"]));
-        let said = |template| fill(template, &facts);
-        assert_eq!(said("{{joints:each late}}"), "{j5: -12.3, j6: -12.3}");
-        assert_eq!(said("a[[: {joints:each none}]]"), "a");
+        assert_eq!(said("{{markers:each late}}"), "{a: -12.3, b: -12.3}");
+        assert_eq!(said("a[[: {markers:each none}]]"), "a");
         assert_eq!(
             said("{markers:exchange}; {markers:code}"),
             "a ↔ b; `a`, `b`"

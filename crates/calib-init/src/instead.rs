@@ -6,7 +6,6 @@ use calib_urdf::{Problem, ReadError, RobotModel};
 use crate::columns::guess;
 use crate::error::{InitError, Instead};
 use crate::header::header;
-use crate::source::is_profile;
 
 /// Bytes of the file that are looked at.
 pub const HEAD: usize = 1 << 20;
@@ -72,3 +71,11 @@ fn instead(head: &[u8]) -> Option<Instead> {
 
 /// A robot of which no column is a joint.
 const NO_JOINTS: &str = "<robot name=\"none\"><link name=\"none\"/></robot>";
+
+/// Whether a text is a profile of calib: the version is a key of the first level of every profile, and of nothing else.
+pub(crate) fn is_profile(text: &str) -> bool {
+    text.lines().any(|line| {
+        let version = line.strip_prefix("calib:").map(str::trim);
+        version.is_some_and(|v| v.starts_with(|c: char| c.is_ascii_digit()))
+    })
+}

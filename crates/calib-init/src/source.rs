@@ -11,7 +11,7 @@ use crate::error::{InitError, NoRecording};
 use crate::fact::About;
 use crate::guess::Guess;
 use crate::header::header;
-use crate::instead::HEAD;
+use crate::instead::{HEAD, is_profile};
 
 /// A file as the caller has it.
 #[derive(Debug, Clone)]
@@ -206,14 +206,6 @@ fn no_recording(bytes: &[u8]) -> Option<NoRecording> {
         return text.contains("<robot").then_some(NoRecording::Robot);
     }
     is_profile(text).then_some(NoRecording::Profile)
-}
-
-/// Whether a text is a profile of calib: the version is a key of the first level of every profile, and of nothing else.
-pub(crate) fn is_profile(text: &str) -> bool {
-    text.lines().any(|line| {
-        let version = line.strip_prefix("calib:").map(str::trim);
-        version.is_some_and(|v| v.starts_with(|c: char| c.is_ascii_digit()))
-    })
 }
 
 /// Numbers that the reader took for lost samples because they repeat.

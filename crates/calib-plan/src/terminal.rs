@@ -30,7 +30,7 @@ pub fn summary(plan: &Plan, folder: &str, columns: usize) -> String {
         let first = format!("{name:<LEFT$}");
         text += &wrapped(said, columns, &first, &" ".repeat(LEFT));
     };
-    line("chosen for", &words::goal(plan.goal));
+    line("chosen for", words::goal(plan.goal));
     let [sigma, before] = [plan.sigma, plan.sigma_before].map(words::length);
     line("expected σ", &format!("{sigma} (before: {before})"));
     let stops = [12, 24].into_iter().filter(|n| *n < measured);

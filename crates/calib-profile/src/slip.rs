@@ -57,14 +57,30 @@ pub(crate) fn time_column(column: &str) -> String {
     format!("time: {{column: {column}, unit: {}}}", unit.unwrap_or("s"))
 }
 
-/// The text in double quotes that begins at the place, with a backslash in it: as a person means a path of Windows, with `/`.
-pub(crate) fn backslashes(text: &str, place: Place) -> Option<String> {
+/// The text in double quotes that begins at the place, with a backslash in it.
+fn with_backslashes(text: &str, place: Place) -> Option<&str> {
     let (_, from) = around(text, place)?;
     let quoted = from.strip_prefix('"')?;
     let written = &quoted[..quoted.find('"')?];
-    written
-        .contains('\\')
-        .then(|| written.replace("\\\\", "/").replace('\\', "/"))
+    written.contains('\\').then_some(written)
+}
+
+/// The text in double quotes that begins at the place, with a backslash in it: as a person means a path of Windows, with `/`.
+pub(crate) fn backslashes(text: &str, place: Place) -> Option<String> {
+    let written = with_backslashes(text, place)?;
+    Some(written.replace("\\\\", "/").replace('\\', "/"))
+}
+
+/// Whether that text is a path of Windows rather than one with escapes: it begins with a drive, or ends as a file does, and has no character by its number.
+pub(crate) fn is_path(text: &str, place: Place) -> bool {
+    let Some(written) = with_backslashes(text, place) else {
+        return false;
+    };
+    let has_drive = written.chars().nth(1) == Some(':');
+    let is_ending = |e: &str| (2..=5).contains(&e.len()) && e.chars().all(char::is_alphanumeric);
+    let ends_as_file = written.rsplit_once('.').is_some_and(|(_, e)| is_ending(e));
+    let by_number = ["\\u00", "\\x"].iter().any(|n| written.contains(n));
+    (has_drive || ends_as_file) && !by_number
 }
 
 /// Whether the line of a place is indented by a tab.

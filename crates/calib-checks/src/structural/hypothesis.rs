@@ -1,14 +1,13 @@
 //! The hypotheses: what may be wrong with the data or with the claims about them, and how each is corrected.
 
 use std::f64::consts::{FRAC_PI_2, PI};
-use std::sync::LazyLock;
 
-use nalgebra::{Isometry3, Matrix3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Quaternion, Translation3, Unit, UnitQuaternion, Vector3};
 use serde::Serialize;
 
 use super::ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex};
 use super::order::ColumnOrder;
-use super::rotation::cube;
+use super::rotation::{axes_rotation, cube};
 
 /// A unit that was misread in the column of a joint: what the values are, and what they were read as.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
@@ -349,15 +348,6 @@ pub struct Scoped {
     pub hypothesis: Hypothesis,
     /// Where.
     pub scope: Scope,
-}
-
-/// The rotation that a [`Hypothesis::TrackerAxes`] applies to the coordinates of its recording; 0 is the identity.
-#[must_use]
-pub fn axes_rotation(rotation: u8) -> Matrix3<f64> {
-    // Asked for once for every sample.
-    static CUBE: LazyLock<Vec<Matrix3<f64>>> = LazyLock::new(|| cube().collect());
-    let found = CUBE.get(usize::from(rotation));
-    found.copied().unwrap_or_else(Matrix3::identity)
 }
 
 /// `reading_joint ← factor · reading_joint + coupling · reading_source + offset`.

@@ -98,7 +98,7 @@ pub use data::{Body, Data, DataError, Measured};
 pub use decide::{explain, registration_residual};
 pub use hypothesis::{
     Direction, Hypothesis, Length, PoseMistake, QuarterTurns, Scope, Scoped, TRACKER_UNITS,
-    UnitMistake, axes_rotation,
+    UnitMistake,
 };
 pub use ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex, SampleIndex};
 pub use jump::{Jump, Moved, Size};
@@ -109,6 +109,7 @@ pub use outcome::{
 };
 pub use readings::WrongReadings;
 pub use registration::{PointRows, Registered, registration, registrations};
+pub use rotation::axes_rotation;
 pub use rounding::{Rounding, by_rounding_alone, rounding};
 pub use rows::{Deviation, Deviations, deviations};
 pub use thinning::thin;

@@ -1,5 +1,7 @@
 //! The least value of a quadratic over the rotations.
 
+use std::sync::LazyLock;
+
 use calib_geometry::decompose::symmetric_eigen_small;
 use calib_geometry::so3;
 use nalgebra::{Matrix3, Rotation3, SMatrix, SVector, Vector3};
@@ -205,4 +207,13 @@ pub(crate) fn cube() -> impl Iterator<Item = Matrix3<f64>> {
             (r.determinant() > 0.0).then_some(r)
         })
     })
+}
+
+/// The rotation that a [`TrackerAxes`](super::hypothesis::Hypothesis::TrackerAxes) applies to the coordinates of its recording; 0 is the identity.
+#[must_use]
+pub fn axes_rotation(rotation: u8) -> Matrix3<f64> {
+    // Asked for once for every sample.
+    static CUBE: LazyLock<Vec<Matrix3<f64>>> = LazyLock::new(|| cube().collect());
+    let found = CUBE.get(usize::from(rotation));
+    found.copied().unwrap_or_else(Matrix3::identity)
 }

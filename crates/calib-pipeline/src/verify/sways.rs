@@ -21,7 +21,7 @@ use crate::prepare::inputs::Inputs;
 const CHANCE: f64 = 1e-6;
 /// Share of the other bodies' squared residuals that follows the body's at least.
 const SHARE: f64 = 0.3;
-/// How far the others move per motion of the body: its own noise makes it less, a turn of the tracker makes it another one.
+/// How far the others move per motion of the body: its own noise makes it less, a rotation of the tracker makes it another one.
 const SLOPE: std::ops::Range<f64> = 0.3..3.0;
 /// Rows of a recording that are compared, at least: mean, trend and step take four.
 const FEWEST: usize = 8;

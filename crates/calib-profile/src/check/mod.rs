@@ -10,6 +10,7 @@ use crate::error::{Problem, ProfileError, escaped, expected, one_of};
 use crate::locate::{Place, Places};
 use crate::profile::{FromRoot, Outputs, Profile, Tracker};
 use crate::raw::{RawFree, RawFromRoot, RawPose, RawProfile};
+use crate::slip;
 use crate::units::{DEG, MM, split_joint_key};
 
 /// The only version of the format so far.
@@ -45,7 +46,8 @@ pub fn check(
     }
     let places = Places::of(text);
     let hidden = places.hidden().into_iter();
-    let hidden = hidden.map(|hidden| escaped(text, hidden.0).unwrap_or_else(|| hides(hidden)));
+    let of_path = |place| escaped(text, place).filter(|_| slip::is_path(text, place));
+    let hidden = hidden.map(|hidden| of_path(hidden.0).unwrap_or_else(|| hides(hidden)));
     let hidden: Vec<Problem> = hidden.collect();
     if !hidden.is_empty() {
         return Err(ProfileError::new(file, text, hidden));
