@@ -9,6 +9,17 @@ use std::path::Path;
 /// # Errors
 /// What the system says; [`ErrorKind::IsADirectory`] for a folder, [`ErrorKind::InvalidInput`] for anything else that is no regular file.
 pub fn open(path: &Path) -> Result<File> {
+    let file = file_or_folder(path)?;
+    // The system refuses it only when it is read, and with a number.
+    if file.metadata()?.is_dir() {
+        let text = "it is a folder, not a file";
+        return Err(Error::new(ErrorKind::IsADirectory, text));
+    }
+    Ok(file)
+}
+
+/// The same, and folders as well.
+pub(crate) fn file_or_folder(path: &Path) -> Result<File> {
     let mut options = OpenOptions::new();
     options.read(true);
     // Opening a pipe waits for its writer without it; regular files know no difference.
@@ -16,13 +27,8 @@ pub fn open(path: &Path) -> Result<File> {
     std::os::unix::fs::OpenOptionsExt::custom_flags(&mut options, libc::O_NONBLOCK);
     let file = options.open(path)?;
     let kind = file.metadata()?.file_type();
-    if kind.is_file() {
+    if kind.is_file() || kind.is_dir() {
         return Ok(file);
-    }
-    // The system refuses it only when it is read, and with a number.
-    if kind.is_dir() {
-        let text = "it is a folder, not a file";
-        return Err(Error::new(ErrorKind::IsADirectory, text));
     }
     Err(Error::new(
         ErrorKind::InvalidInput,

@@ -168,7 +168,7 @@ pub(crate) fn clean(folder: &Path) {
         if !(kind.is_file() || kind.is_dir()) {
             continue;
         }
-        let Ok(file) = crate::input::open(&path) else {
+        let Ok(file) = crate::input::file_or_folder(&path) else {
             continue;
         };
         // The lock is held until the file is gone.
