@@ -160,25 +160,32 @@ fn without_trend(rows: &[Pair]) -> Vec<Pair> {
         .collect()
 }
 
-/// Less the step of both that takes most of the body's motion; the rows have no mean.
+/// Less the step of both that takes most of the body's motion beside the line; the rows have no mean and no trend.
 fn without_step(rows: &[Pair]) -> Vec<Pair> {
-    let count = rows.len();
-    let mut before = [Vector3::zeros(); 2];
-    let mut best = (0.0, 0, before);
-    for (i, pair) in rows.iter().enumerate().take(count - SIDE) {
-        (0..2).for_each(|k| before[k] += pair[k]);
-        let (first, last) = ((i + 1) as f64, (count - i - 1) as f64);
-        let gain = before[0].norm_squared() * (1.0 / first + 1.0 / last);
-        if i + 1 >= SIDE && gain > best.0 {
-            best = (gain, i + 1, before);
+    let count = rows.len() as f64;
+    let middle = 0.5 * (count - 1.0);
+    let at = |i: usize| i as f64 - middle;
+    let square: f64 = (0..rows.len()).map(|i| at(i).powi(2)).sum();
+    // Of a step from row k on, less its own line: Σ s x = −Σ_{i<k} x, and Σ s².
+    let (mut before, mut lever) = ([Vector3::zeros(); 2], 0.0);
+    let mut best = (0.0, 0, lever, [Vector3::zeros(); 2]);
+    for k in 1..rows.len() - SIDE + 1 {
+        (0..2).for_each(|of| before[of] += rows[k - 1][of]);
+        lever -= at(k - 1);
+        let behind = count - k as f64;
+        let own = behind - behind * behind / count - lever * lever / square;
+        let gain = before[0].norm_squared() / own;
+        if k >= SIDE && own > 1e-9 * count && gain > best.0 {
+            best = (gain, k, lever, before.map(|sum| -sum / own));
         }
     }
-    let (_, at, before) = best;
-    let level = |i: usize, k: usize| match i < at {
-        true => before[k] / at as f64,
-        false => -before[k] / (count - at) as f64,
+    let (_, first, lever, size) = best;
+    let behind = rows.len() - first;
+    let step = |i: usize| {
+        let own = f64::from(u8::from(i >= first));
+        own - behind as f64 / count - at(i) * lever / square
     };
     let rows = rows.iter().enumerate();
-    rows.map(|(i, pair)| [0, 1].map(|k| pair[k] - level(i, k)))
+    rows.map(|(i, pair)| [0, 1].map(|of| pair[of] - size[of] * step(i)))
         .collect()
 }
