@@ -18,6 +18,7 @@ mod designs;
 mod drift;
 mod effects;
 mod exchanged;
+mod eye_in_hand;
 mod facts;
 mod few_rows;
 mod fit;

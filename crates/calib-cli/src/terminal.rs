@@ -64,17 +64,21 @@ impl When {
 /// Columns that a line is still readable with.
 const COLUMNS: std::ops::RangeInclusive<usize> = 40..=120;
 
-/// Color and width of standard output: COLUMNS, else the terminal's width, else 80.
+/// Columns of a stream that a reader sees: COLUMNS, else its terminal's width; `None` where it goes to no terminal.
+fn columns(terminal: &console::Term) -> Option<usize> {
+    let stated = std::env::var("COLUMNS").ok();
+    let stated = stated.and_then(|columns| columns.parse::<usize>().ok());
+    let seen = || terminal.size_checked();
+    let columns = stated.or_else(|| seen().map(|(_, columns)| usize::from(columns)));
+    columns.map(|columns| columns.clamp(*COLUMNS.start(), *COLUMNS.end()))
+}
+
+/// Color and width of standard output; [`Look::default`]'s width where nothing states one.
 #[must_use]
 pub fn look(color: When) -> Look {
-    let stated = std::env::var("COLUMNS").ok();
-    let stated = stated.and_then(|columns| columns.parse().ok());
-    let seen = || console::Term::stdout().size_checked();
-    let columns = stated.or_else(|| seen().map(|(_, columns)| usize::from(columns)));
-    let columns = columns.unwrap_or(Look::default().columns);
     Look {
         color: color.colors(),
-        columns: columns.clamp(*COLUMNS.start(), *COLUMNS.end()),
+        columns: columns(&console::Term::stdout()).unwrap_or(Look::default().columns),
     }
 }
 
@@ -82,12 +86,8 @@ pub fn look(color: When) -> Look {
 /// says how wide a reader shows it.
 #[must_use]
 pub fn folded(text: &str) -> String {
-    let stated = std::env::var("COLUMNS").ok();
-    let stated = stated.and_then(|columns| columns.parse().ok());
-    let seen = || console::Term::stderr().size_checked();
-    let columns = stated.or_else(|| seen().map(|(_, columns)| usize::from(columns)));
-    match columns {
-        Some(columns) => folded_to(text, columns.clamp(*COLUMNS.start(), *COLUMNS.end())),
+    match columns(&console::Term::stderr()) {
+        Some(columns) => folded_to(text, columns),
         None => text.to_owned(),
     }
 }

@@ -15,7 +15,7 @@ use calib_pipeline::options::Plugins;
 use calib_pipeline::prepare::inputs::{Inputs, RobotProfile};
 use calib_pipeline::prepare::load::load_recordings;
 use calib_pipeline::prepare::tracks::BodyTrack;
-use calib_profile::{Body, BodyKind, Profile, Usage};
+use calib_profile::{Body, BodyKind, Profile, RecordingSpec, Usage};
 use calib_urdf::JointId;
 use nalgebra::{Isometry3, Point3};
 
@@ -42,6 +42,8 @@ pub struct Known {
     pub placed: bool,
     /// Bodies and markers that will not be recorded, though they can be seen.
     pub unrecorded: BTreeSet<String>,
+    /// Bodies that see the tracker, as the columns of any recording of the profile say: the noise is of that pose.
+    pub inverse: BTreeSet<String>,
     /// What was assumed.
     pub notes: Vec<Note>,
 }
@@ -67,6 +69,8 @@ impl Known {
     /// [`PipelineError`] for a recording that exists and cannot be read.
     pub fn of(mut robot: RobotProfile, plugins: Plugins) -> Result<Self, PipelineError> {
         let mut notes = Vec::new();
+        let recordings = robot.profile.recordings.values();
+        let inverse = recordings.flat_map(RecordingSpec::inverse_bodies).collect();
         let missing = without_missing(&mut robot);
         let exist = &robot.profile.recordings;
         let any_fitted = exist.values().any(|r| r.usage != Usage::Validation);
@@ -81,6 +85,7 @@ impl Known {
                 Ok(known) => {
                     return Ok(Self {
                         notes: [notes, known.notes].concat(),
+                        inverse,
                         ..known
                     });
                 }
@@ -89,7 +94,10 @@ impl Known {
                 }),
             }
         }
-        Ok(Self::of_profile(robot, notes))
+        Ok(Self {
+            inverse,
+            ..Self::of_profile(robot, notes)
+        })
     }
 
     /// How the noise of markers follows the cameras.
@@ -161,6 +169,7 @@ impl Known {
             still,
             placed: true,
             unrecorded: BTreeSet::new(),
+            inverse: BTreeSet::new(),
             notes,
             tracks: checked.tracks,
             start: checked.start,
@@ -200,6 +209,7 @@ impl Known {
         Self {
             placed: place.is_some(),
             unrecorded: BTreeSet::new(),
+            inverse: BTreeSet::new(),
             inputs: None,
             tracks,
             start,
@@ -259,6 +269,7 @@ fn assumed(
         marker_sigma: None,
         is_computed: false,
         poses: BTreeMap::new(),
+        inverse: BTreeSet::new(),
     };
     if mount.is_none() {
         notes.push(Note::MountAssumed { body: name.clone() });

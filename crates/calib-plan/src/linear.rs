@@ -130,6 +130,9 @@ impl Known {
                     c.seen[i].map(|_| self.start.tracker_from_root * link * mount)
                 });
                 track.poses.insert(PLANNED.to_owned(), poses.collect());
+                if self.inverse.contains(name) || !track.inverse.is_empty() {
+                    track.inverse.insert(PLANNED.to_owned());
+                }
             }
         }
         let formulation = ml::state(&inputs, &tracks, &self.start, FreeSet::Profile);

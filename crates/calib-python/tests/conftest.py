@@ -17,13 +17,14 @@ Program = Callable[..., subprocess.CompletedProcess[str]]
 
 @pytest.fixture(scope="session")
 def program() -> Program:
-    """Runs the program `calib` in the repository: the one that `CALIB_PROGRAM` names, else that of the package."""
+    """Runs the program `calib` in the repository: the one that `CALIB_PROGRAM` names, else that of the package. Lines are as long as they are."""
     named = os.environ.get("CALIB_PROGRAM")
     command = [named] if named else [sys.executable, "-m", "calib"]
+    unbound = {name: value for name, value in os.environ.items() if name != "COLUMNS"}
 
     def run(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
         words: Sequence[str] = [*command, *map(str, arguments)]
-        return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False)
+        return subprocess.run(words, cwd=ROOT, capture_output=True, text=True, check=False, env=unbound)
 
     return run
 

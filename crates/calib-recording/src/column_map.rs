@@ -4,7 +4,7 @@ use crate::euler::EulerAxes;
 use crate::units::{AngleUnit, LengthUnit, TimeUnit};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Meaning of the columns of a delimited table whose header does not follow our own rules.
 ///
@@ -119,7 +119,8 @@ pub struct BodyColumns {
     /// Columns of angles about axes that turn with the body, and which axes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub euler: Option<EulerColumns>,
-    /// The columns hold the pose of the tracker in the body, as a camera's software states where the camera is: the inverse is used.
+    /// The columns hold the pose of the tracker in the body, as the software of a camera on the robot states where a board is: the inverse is used.
+    /// The tracker's noise is that of the pose as it was measured, so of the board in the camera.
     #[serde(skip_serializing_if = "is_false")]
     pub inverted: bool,
 }
@@ -267,6 +268,14 @@ impl ColumnMap {
             ..self.clone()
         };
         without != ColumnMap::default()
+    }
+
+    /// The bodies whose columns hold the pose of the tracker in the body.
+    #[must_use]
+    pub fn inverse_bodies(&self) -> BTreeSet<String> {
+        let resolved = self.resolved().unwrap_or_default();
+        let inverse = resolved.bodies.into_iter().filter(|(_, of)| of.inverted);
+        inverse.map(|(name, _)| name).collect()
     }
 
     /// This map on top of its preset: what is given here wins, maps of the preset are replaced as a whole.

@@ -2,7 +2,7 @@
 
 use calib_finding::Finding;
 use nalgebra::{Isometry3, Matrix6, Point3};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Everything that one file says: streams of joints, torques, temperatures, bodies and markers, in SI, each with its clock.
 ///
@@ -42,6 +42,8 @@ pub struct Meta {
     pub findings: Vec<Finding>,
     /// The columns of joints, by the joint, of a table.
     pub joint_columns: BTreeMap<String, JointColumn>,
+    /// Bodies whose poses the file states the other way round, the tracker's in the body: that is what was measured, with its noise.
+    pub inverse_bodies: BTreeSet<String>,
 }
 
 /// The column of a joint.

@@ -53,6 +53,9 @@ impl Recording {
                 from: from.clone(),
             }));
         }
+        let inverse = std::mem::take(&mut self.meta.inverse_bodies).into_iter();
+        let inverse = inverse.map(|name| new.get(&name).cloned().unwrap_or(name));
+        self.meta.inverse_bodies = inverse.collect();
         let bodies = self.bodies.iter_mut().map(|b| &mut b.name);
         let markers = self.markers.iter_mut().map(|m| &mut m.name);
         for name in bodies.chain(markers) {

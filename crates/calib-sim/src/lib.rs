@@ -134,6 +134,7 @@ pub fn simulate_postures(
         };
         let all: Vec<String> = profile.bodies.keys().cloned().collect();
         let bodies = protocol.map_or(&all, |protocol| &protocol.bodies);
+        let tracker = tracker.clone().in_recording(name);
         let poses = measure(&tracker, model, &commanded, bodies, &mut rng);
         simulated.recordings.insert(name.clone(), poses);
     }
@@ -167,6 +168,7 @@ pub fn simulate_again(
     let tracker = Tracker::before(profile, plan, &robot, postures);
     let mut recordings = BTreeMap::new();
     for (name, protocol, commanded, mut rng) in all {
+        let tracker = tracker.clone().in_recording(name);
         let mut poses = measure(&tracker, model, &commanded, &protocol.bodies, &mut rng);
         if !commanded.groups.is_empty() {
             let group = profile.recordings.get(name).and_then(|r| r.group.clone());

@@ -58,7 +58,7 @@ pub fn timed(
         q
     };
     let indicated: Vec<Vec<f64>> = (0..postures.len()).map(posture).collect();
-    let tracker = Tracker::before(profile, plan, &robot, indicated.iter());
+    let tracker = Tracker::before(profile, plan, &robot, indicated.iter()).in_recording(name);
     let mut off = || -> Vec<f64> {
         let joints = 0..model.joints().len();
         let draw = |_| rng.sample::<f64, _>(StandardNormal) * plan.noise.joint;

@@ -1,7 +1,9 @@
 //! What the tracker sees of the bodies in one pose of the robot: eqs. (3) and (4) of the crate's page.
 
+use std::collections::BTreeSet;
+
 use calib_geometry::{Twist, se3};
-use calib_profile::{Body, BodyKind, Profile, Simulation};
+use calib_profile::{Body, BodyKind, Profile, RecordingSpec, Simulation};
 use calib_recording::Poses;
 use nalgebra::{Cholesky, Isometry3, Matrix3, Point3};
 use rand::RngExt;
@@ -10,12 +12,15 @@ use rand_chacha::ChaCha12Rng;
 use crate::{normal3, robot::TrueRobot};
 
 /// A tracker before the true robot.
+#[derive(Clone)]
 pub(crate) struct Tracker<'a> {
     pub(crate) profile: &'a Profile,
     pub(crate) plan: &'a Simulation,
     pub(crate) robot: &'a TrueRobot,
     /// Factor of the covariances that the cameras cause: 1 per coordinate on average.
     scale: f64,
+    /// Bodies that see the tracker: the noise is of that pose.
+    inverse: BTreeSet<String>,
 }
 
 impl<'a> Tracker<'a> {
@@ -32,6 +37,7 @@ impl<'a> Tracker<'a> {
             plan,
             robot,
             scale: 1.0,
+            inverse: BTreeSet::new(),
         };
         if profile.plan.cameras.is_empty() {
             return tracker;
@@ -60,6 +66,13 @@ impl<'a> Tracker<'a> {
             tracker.scale = 3.0 * f64::from(count) / sum;
         }
         tracker
+    }
+
+    /// The same for the bodies of a recording, as its columns say what is measured.
+    pub(crate) fn in_recording(mut self, name: &str) -> Self {
+        let recording = self.profile.recordings.get(name);
+        self.inverse = recording.map_or_else(BTreeSet::new, RecordingSpec::inverse_bodies);
+        self
     }
 
     /// `tracker_from_root · FK'(q_true) · link_from_body'`.
@@ -100,7 +113,11 @@ impl<'a> Tracker<'a> {
                         normal3(rng, noise.body.position * noise_times),
                     );
                     let seen = rng.random::<f64>() >= noise.occluded;
-                    let sample = seen.then(|| tracker_from_body * se3::exp(&error));
+                    let error = se3::exp(&error);
+                    let sample = seen.then(|| match self.inverse.contains(name) {
+                        false => tracker_from_body * error,
+                        true => error.inverse() * tracker_from_body,
+                    });
                     poses.bodies.entry(name.clone()).or_default().push(sample);
                 }
                 BodyKind::Markers { names, .. } => {

@@ -97,11 +97,16 @@ impl Replay<'_> {
             let mount = robot.mounts.get(name).copied();
             match &body.kind {
                 BodyKind::Pose => {
+                    let inverse = loaded.meta.inverse_bodies.contains(name);
                     let seen = loaded.poses.bodies.get_mut(name);
                     let seen = seen.and_then(|track| track.get_mut(row)?.as_mut());
                     if let (Some(seen), Some(mount)) = (seen, mount) {
                         let levels = self.noise.bodies.get(name).copied();
-                        *seen = link * mount * slip * drawn(levels, rng);
+                        let (there, error) = (link * mount * slip, drawn(levels, rng));
+                        *seen = match inverse {
+                            false => there * error,
+                            true => error.inverse() * there,
+                        };
                     }
                 }
                 BodyKind::Markers { names, .. } => {

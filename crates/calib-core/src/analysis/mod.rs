@@ -38,4 +38,5 @@ pub(crate) mod tails;
 pub(crate) mod untested;
 pub(crate) mod validate;
 pub(crate) mod weigh;
+mod which_side;
 pub(crate) mod widths;

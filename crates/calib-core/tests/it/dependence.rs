@@ -74,7 +74,11 @@ fn case_of(free: Free, seen: Seen, (seed, factor): (u64, f64), poses: usize, rho
         let turned = UnitQuaternion::from_scaled_axis(normal3(&mut r) * TURN);
         let at = Translation3::from((x.translation.vector + state[0] * SIGMA) * factor);
         let pose = Isometry3::from_parts(at, x.rotation * turned);
-        bodies.push(PoseObservation { sample, pose });
+        bodies.push(PoseObservation {
+            sample,
+            pose,
+            inverse: false,
+        });
     }
     let p = &mut h.problem;
     match seen {

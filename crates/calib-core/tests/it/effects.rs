@@ -63,7 +63,11 @@ fn recover(effect: &Effect, motion: Axis) {
             let moved = JointMotion::new((motion, REACH), state.q, amounts);
             let a_from_b = moved.joint_from_child();
             let pose = base_from_a * a_from_b * jitter(&mut r, NOISE, NOISE);
-            PoseObservation { sample, pose }
+            PoseObservation {
+                sample,
+                pose,
+                inverse: false,
+            }
         })
         .collect();
     let noise = PoseNoise::Split {
@@ -143,7 +147,11 @@ fn yielding(seed: u64) -> [f64; 3] {
             let load = (1.0 + truth[0]) * lever[0][s] + (1.0 + truth[1]) * lever[1][s];
             let moved = JointMotion::new((motion, REACH), q[s], [(kind, SOFT * load)]);
             let pose = moved.joint_from_child() * jitter(&mut r, sigma, sigma);
-            PoseObservation { sample: s, pose }
+            PoseObservation {
+                sample: s,
+                pose,
+                inverse: false,
+            }
         })
         .collect();
     let noise = PoseNoise::Split {
@@ -203,7 +211,11 @@ fn the_common_scale_of_masses_and_compliances_is_named() {
         .map(|s| {
             let moved = JointMotion::new((motion, REACH), q[s], [(kind, 3e-3 * lever[s])]);
             let pose = moved.joint_from_child() * jitter(&mut r, NOISE, NOISE);
-            PoseObservation { sample: s, pose }
+            PoseObservation {
+                sample: s,
+                pose,
+                inverse: false,
+            }
         })
         .collect();
     let noise = PoseNoise::Split {
@@ -284,7 +296,11 @@ fn with_confounders(effect: &Effect, seed: u64) -> Vec<f64> {
                 .map(|(_, term, c)| (term.kind, c * term.regressor.at(state)));
             let moved = JointMotion::new((motion, REACH), state.q, amounts).joint_from_child();
             let pose = moved * jitter(&mut r, SIGMA, SIGMA);
-            PoseObservation { sample, pose }
+            PoseObservation {
+                sample,
+                pose,
+                inverse: false,
+            }
         })
         .collect();
     let noise = PoseNoise::Split {

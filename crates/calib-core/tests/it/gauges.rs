@@ -712,6 +712,7 @@ fn a_gain_and_a_size_are_one_number_when_no_length_is_known() {
         .map(|(sample, q)| calib_core::PoseObservation {
             sample,
             pose: Isometry3::translation(1.02 * q, 0.0, 0.0),
+            inverse: false,
         })
         .collect();
     p.poses(

@@ -192,6 +192,7 @@ fn all_heads(rig: &mut Rig, from: calib_core::FrameId, to: calib_core::FrameId, 
         .map(|sample| PoseObservation {
             sample,
             pose: jitter(&mut r, 0.6, 0.5),
+            inverse: false,
         })
         .collect();
     add(
@@ -295,6 +296,7 @@ fn a_block_that_occurs_twice_contributes_twice() {
                 .map(|sample| PoseObservation {
                     sample,
                     pose: pose(0.1, 0.2, 0.3, 0.2, 0.1, 0.4),
+                    inverse: false,
                 })
                 .collect(),
         }),

@@ -267,6 +267,7 @@ fn what_cannot_be_stated_is_refused_by_name() {
             observations: vec![PoseObservation {
                 sample: 0,
                 pose: Isometry3::identity(),
+                inverse: false,
             }],
         }),
     });
@@ -287,6 +288,7 @@ fn what_cannot_be_stated_is_refused_by_name() {
         vec![PoseObservation {
             sample: 0,
             pose: Isometry3::identity(),
+            inverse: false,
         }],
     );
     assert!(refused(&p).starts_with("`h covariance` must be positive"));
@@ -309,6 +311,7 @@ fn predictions_along_measured_edges_are_refused() {
             .map(|sample| PoseObservation {
                 sample,
                 pose: Isometry3::identity(),
+                inverse: false,
             })
             .collect(),
     );
@@ -346,6 +349,7 @@ fn lost_measurements_drop_their_observations_with_a_reason() {
             .map(|sample| PoseObservation {
                 sample,
                 pose: pose(0.1, 0.0, 0.0, 0.0, 0.0, 0.2),
+                inverse: false,
             })
             .collect(),
     );
@@ -393,6 +397,7 @@ fn a_measured_edge_with_covariance_weighs_like_noise_of_the_head() {
                 .map(|sample| PoseObservation {
                     sample,
                     pose: truth,
+                    inverse: false,
                 })
                 .collect(),
         );

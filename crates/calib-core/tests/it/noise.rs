@@ -204,6 +204,7 @@ fn of_poses(seed: u64, poses: usize, better: f64) -> [f64; 2] {
     let of_sample = |(sample, q): (usize, &Vec<f64>)| calib_core::PoseObservation {
         sample,
         pose: chain.tracker_from_body(q, &[0.0; 6]) * crate::common::jitter(&mut r, o, t),
+        inverse: false,
     };
     let seen = chain.q.iter().enumerate().map(of_sample).collect();
     let noise = calib_core::PoseNoise::Split {

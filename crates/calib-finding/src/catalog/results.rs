@@ -169,6 +169,15 @@ super::topic! {
             "The cameras of the profile would make the noise of a marker {ratio} times as large along one direction as along another (median). With that noise the fit has no result or does not converge: it uses equal noise.",
             "Check the places and fields of the cameras (`plan: {{cameras: …}}`): two in one place say nothing of depth.";
     }
+    /// Measured poses have the errors of their inverses, or the other way round.
+    NOISE_OF_INVERSE = "noise-of-inverse" {
+        "body_sees": Info,
+            "The errors of these poses are those of an instrument on the body that sees the tracker's frame, such as a camera before a board: an error of an angle moves the body about that frame. The fit weighs them so, and the σ of the tracker is that of the frame as the body sees it.",
+            "No action is needed.";
+        "tracker_sees": Info,
+            "The columns state where the tracker's frame is in the body, but their errors are those of a tracker that sees the body: an error of an angle does not move it. The fit weighs them so, and the σ of the tracker is that of the body as the tracker sees it.",
+            "No action is needed.";
+    }
     /// The tracker's noise in a recording is another one than in the others.
     RECORDING_NOISE = "recording-noise" {
         "fitted": Info,
@@ -216,9 +225,12 @@ super::topic! {
     }
     /// All lengths were found in one ratio to those of the URDF.
     LENGTHS_IN_ONE_RATIO = "lengths-in-one-ratio" {
-        "": Warning,
+        "clear": Warning,
             "The {count} lengths of the robot that were found are {scale:percent} ± {sigma:percent} longer than in the URDF (negative: shorter), all in one ratio: the tracker's unit of length is off by as much, or the URDF's is.",
             "Measure a known length with the tracker, such as a scale bar. If the tracker is right, the result is, too. If not, calibrate the tracker, or correct the scale of its export, and record again.";
+        "perhaps": Warning,
+            "The {count} lengths of the robot that were found are {scale:percent} ± {sigma:percent} longer than in the URDF (negative: shorter). They may be so in one ratio, which errors of single lengths imitate with a probability of {chance:percent}: then the tracker's unit of length is off by as much, or the URDF's is, and all lengths and distances of the result are.",
+            "Measure a known length with the tracker, such as a scale bar or the printed board. If the tracker is right, the result is, too. If not, calibrate the tracker, or correct the scale of its export, and record again.";
     }
     /// Contacts that leave a direction of the root open.
     CONTACT_DIRECTION_MISSING = "contact-direction-missing" {

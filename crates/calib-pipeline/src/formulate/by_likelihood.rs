@@ -1,7 +1,10 @@
 //! The result of the fit of all loops.
 
+use std::collections::BTreeMap;
+
 use calib_core::{ParameterEstimate, ParameterKind, Settings};
 use calib_finding::{About, Fact, Finding, Severity, Unit, catalog};
+use calib_profile::BodyKind;
 use calib_report::{Status, Unobservable};
 
 use crate::error::PipelineError;
@@ -19,11 +22,11 @@ use crate::formulate::solved::Solved;
 use crate::formulate::stuck::{is_stuck, without_stuck};
 use crate::formulate::{
     cameras, clock, computed, gain_or_scale, gear_ratio, noise, places, priors, row_levels, starts,
-    wanted,
+    wanted, which_side,
 };
 use crate::prepare::inputs::Inputs;
 use crate::prepare::repeats::merge;
-use crate::prepare::tracks::body_tracks;
+use crate::prepare::tracks::{BodyTrack, body_tracks};
 
 /// Rows of a motion are taken again at better times at most this often; the first time leaves what is of second order.
 const ALIGNMENTS: usize = 3;
@@ -59,7 +62,16 @@ pub fn likelihood(
     };
     let place = places::likeliest(inputs, checked, &settings, progress)?;
     checked.findings.extend(place);
-    let found = sided(inputs, checked, &how, progress)?;
+    let poses = inputs.robot.profile.bodies.values();
+    let any_pose = poses
+        .map(|body| &body.kind)
+        .any(|kind| *kind == BodyKind::Pose);
+    // Rows are judged again with the noise of the other end.
+    let as_read = any_pose.then(|| (inputs.clone(), checked.tracks.clone()));
+    let mut found = sided(inputs, checked, &how, progress)?;
+    if let Some(as_read) = as_read {
+        found = from_its_side(inputs, checked, (&how, as_read), found, progress)?;
+    }
     let (mut registered, mut fit, mut of_rows) =
         before_cameras(inputs, checked, &how, found, progress)?;
     for _ in 0..ALIGNMENTS {
@@ -135,6 +147,41 @@ fn sided(
     }
     checked.findings.extend(starts::findings(inputs));
     Ok(found)
+}
+
+/// What was found, or again with the poses of some bodies measured from their other end, where the recordings say so.
+fn from_its_side(
+    inputs: &mut Inputs,
+    checked: &mut Checked,
+    (how, as_read): (&How<'_>, (Inputs, BTreeMap<String, BodyTrack>)),
+    found: Fits,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Fits, PipelineError> {
+    let told = which_side::told(&found.1);
+    if told.is_empty() {
+        return Ok(found);
+    }
+    let inputs_of_found = std::mem::replace(inputs, as_read.0);
+    let tracks_of_found = std::mem::replace(&mut checked.tracks, as_read.1);
+    which_side::exchange(inputs, &mut checked.tracks, &told);
+    progress("fit again with poses measured from their other end");
+    // What was fitted without this does not depend on a fit with it.
+    let again = sided(inputs, checked, how, progress).ok();
+    let settings = how.settings;
+    let better = |again: &Fits| {
+        let by = again.1.solution.likelier_by(&found.1.solution, settings);
+        by.is_some_and(|by| by > 0.0)
+    };
+    match again.filter(better) {
+        Some(again) => {
+            checked.findings.extend(which_side::findings(inputs, &told));
+            Ok(again)
+        }
+        None => {
+            (*inputs, checked.tracks) = (inputs_of_found, tracks_of_found);
+            Ok(found)
+        }
+    }
 }
 
 /// What was found with equal noise, or again with that of the profile's cameras where the recordings do not contradict it.

@@ -39,4 +39,5 @@ pub(crate) mod starts;
 pub mod structural;
 pub(crate) mod stuck;
 mod wanted;
+mod which_side;
 pub mod without_effects;

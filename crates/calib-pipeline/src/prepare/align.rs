@@ -27,6 +27,7 @@ use crate::prepare::aligned::{Aligned, Alignment, ClockState, SAME_TIME};
 use crate::prepare::blanks;
 use crate::prepare::fresh::only_fresh;
 use crate::prepare::inputs::RobotProfile;
+use crate::prepare::levers::as_seen;
 use crate::prepare::repeats::JITTER;
 use crate::prepare::row_noise::RowNoise;
 use crate::prepare::settled::settle;
@@ -167,7 +168,9 @@ fn aligned(
     };
     match timing.poses {
         TimedPoses::Settle => {
-            settle(name, timing, &robot.profile.tracker, &full, &mut aligned);
+            let inverse = &recording.meta.inverse_bodies;
+            let tracker = as_seen(&robot.profile.tracker, &full, inverse);
+            settle(name, timing, &tracker, &full, &mut aligned);
             if aligned.poses.is_empty() {
                 return Err(DataProblem::NothingStandsStill {
                     recording: name.to_owned(),

@@ -192,6 +192,7 @@ pub fn of_tables(
         let meta = Meta {
             source: spec.file.clone(),
             format: "simulated".to_owned(),
+            inverse_bodies: spec.inverse_bodies(),
             ..Meta::default()
         };
         let loaded = prepare(&robot, name, spec, poses, meta, &mut findings)?;

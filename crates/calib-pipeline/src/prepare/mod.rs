@@ -13,6 +13,7 @@ mod exchanged_rows;
 pub mod excluded;
 mod fresh;
 pub mod inputs;
+mod levers;
 pub mod load;
 pub mod loads;
 pub mod mixed;

@@ -53,6 +53,8 @@ pub fn with_robot_log(mut tracker: Recording, robot: Recording) -> Recording {
     tracker.meta.findings.extend(robot.meta.findings);
     let columns = robot.meta.joint_columns;
     tracker.meta.joint_columns.extend(columns);
+    let inverse = robot.meta.inverse_bodies;
+    tracker.meta.inverse_bodies.extend(inverse);
     tracker
 }
 

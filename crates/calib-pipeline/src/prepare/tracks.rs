@@ -7,12 +7,13 @@ use calib_checks::rigid_body::{
 };
 use calib_finding::nearest_word;
 use calib_finding::{Fact, Finding, Subject, catalog};
-use calib_profile::{Body, BodyKind, Usage};
-use nalgebra::{Isometry3, Point3};
+use calib_profile::{Body, BodyKind, Tracker, Usage};
+use nalgebra::{Isometry3, Point3, Vector3};
 use rayon::prelude::*;
 
 use crate::error::{DataProblem, PipelineError, SeenInstead};
 use crate::prepare::inputs::{Inputs, Loaded};
+use crate::prepare::levers::position_sigma;
 
 /// One body over all recordings.
 #[derive(Debug, Clone)]
@@ -29,9 +30,38 @@ pub struct BodyTrack {
     pub is_computed: bool,
     /// `tracker_from_body` per recording and row; absent recordings do not show the body.
     pub poses: BTreeMap<String, Vec<Option<Isometry3<f64>>>>,
+    /// Recordings that state the pose of the tracker in the body: its inverse is what was measured.
+    pub inverse: BTreeSet<String>,
 }
 
 impl BodyTrack {
+    /// How far a predicted `tracker_from_body` is from the one that a recording shows, in the tracker's axes, m: from where the body is, or from
+    /// where the body sees the tracker.
+    #[must_use]
+    pub fn off(
+        &self,
+        recording: &str,
+        predicted: &Isometry3<f64>,
+        seen: &Isometry3<f64>,
+    ) -> Vector3<f64> {
+        if !self.inverse.contains(recording) {
+            return predicted.translation.vector - seen.translation.vector;
+        }
+        let in_body = |pose: &Isometry3<f64>| pose.inverse().translation.vector;
+        seen.rotation * (in_body(predicted) - in_body(seen))
+    }
+
+    /// The stated σ of a coordinate of where the body is, m; `None` where none is stated. Where the body sees the tracker, its angles have the lever
+    /// from there to the body, across which two of three axes lie.
+    #[must_use]
+    pub fn position_sigma(&self, tracker: &Tracker) -> Option<f64> {
+        let inverse = self.inverse.iter();
+        position_sigma(
+            tracker,
+            inverse.flat_map(|r| self.in_recording(r)).flatten(),
+        )
+    }
+
     /// Poses in one recording; empty where the body is not in it.
     #[must_use]
     pub fn in_recording(&self, recording: &str) -> &[Option<Isometry3<f64>>] {
@@ -178,6 +208,22 @@ fn registered_already(
     same.then(|| all.rows[rows].iter().map(pose).collect())
 }
 
+/// The poses of a body that is recorded as such; whether a fitted recording shows it.
+fn take_poses(inputs: &Inputs, name: &str, track: &mut BodyTrack) -> bool {
+    let mut is_seen = false;
+    for (recording, loaded) in &inputs.recordings {
+        if let Some(poses) = loaded.poses.bodies.get(name) {
+            let is_fitted = loaded.spec.usage != Usage::Validation;
+            is_seen |= is_fitted && poses.iter().any(Option::is_some);
+            track.poses.insert(recording.clone(), poses.clone());
+        }
+        if loaded.meta.inverse_bodies.contains(name) {
+            track.inverse.insert(recording.clone());
+        }
+    }
+    is_seen
+}
+
 fn body_track(
     inputs: &Inputs,
     name: &str,
@@ -191,6 +237,7 @@ fn body_track(
         marker_sigma: None,
         is_computed: false,
         poses: BTreeMap::new(),
+        inverse: BTreeSet::new(),
     };
     let not_seen = || {
         let problem = DataProblem::BodyNotSeen {
@@ -201,24 +248,9 @@ fn body_track(
     };
     let names = match &body.kind {
         BodyKind::Pose => {
-            for (recording, loaded) in &inputs.recordings {
-                if let Some(poses) = loaded.poses.bodies.get(name) {
-                    track.poses.insert(recording.clone(), poses.clone());
-                }
-            }
-            let fitted = inputs
-                .recordings
-                .values()
-                .filter(|r| r.spec.usage != Usage::Validation);
-            let seen = fitted
-                .filter_map(|r| track.poses.get(&r.name))
-                .flatten()
-                .flatten()
-                .count();
-            return if seen == 0 {
-                Err(not_seen())
-            } else {
-                Ok(track)
+            return match take_poses(inputs, name, &mut track) {
+                true => Ok(track),
+                false => Err(not_seen()),
             };
         }
         BodyKind::Markers { names, .. } => names,

@@ -156,7 +156,7 @@ impl OfBody<'_> {
             }
             _ => {
                 if let Some((predicted, seen)) = pair {
-                    let off = predicted.translation.vector - seen.translation.vector;
+                    let off = self.track.off(&loaded.name, &predicted, &seen);
                     push(self.name, off, angle);
                 }
             }

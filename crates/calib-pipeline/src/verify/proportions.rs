@@ -16,12 +16,12 @@ use calib_report::{RobotChange, Unit};
 const LENGTH: f64 = 0.02;
 /// A dimension is known with less than this, m: what the priors hold alone says nothing.
 const KNOWN: f64 = 2e-3;
-/// Lengths that tell a ratio.
-const FEWEST: usize = 3;
+/// Lengths that tell a ratio, beside dimensions that are nominally 0.
+const FEWEST: usize = 2;
 /// A smaller ratio is within what trackers are sold with.
 const SMALLEST: f64 = 5e-4;
-/// Probability of chance of the slope, and of that without the longest.
-const CHANCE: (f64, f64) = (1e-4, 0.01);
+/// Probability of chance of the slope, and of that without the longest: of a ratio that is clear, and of one that may be.
+const CHANCE: [(&str, f64, f64); 2] = [("clear", 1e-4, 0.01), ("perhaps", 0.01, 0.2)];
 /// Slopes with and without the longest length differ by no more, standard errors.
 const ALIKE: f64 = 3.0;
 
@@ -51,11 +51,14 @@ pub(crate) fn finding(changes: &[RobotChange]) -> Option<Finding> {
     }
     let (found, rest) = (slope(&all)?, slope(&all[1..])?);
     let alike = (found.value - rest.value).abs() <= ALIKE * rest.sigma;
-    let clear = found.chance < CHANCE.0 && rest.chance < CHANCE.1;
-    if !alike || !clear || found.value.abs() < SMALLEST {
+    if !alike || found.value.abs() < SMALLEST {
         return None;
     }
-    let finding = Finding::new(catalog::LENGTHS_IN_ONE_RATIO, About::Lengths)
+    let mut kinds = CHANCE.into_iter();
+    let (kind, ..) =
+        kinds.find(|(_, of_all, of_rest)| found.chance < *of_all && rest.chance < *of_rest)?;
+    let finding = Finding::of_kind(catalog::LENGTHS_IN_ONE_RATIO, kind, About::Lengths)
+        .with("chance", Fact::ratio(found.chance))
         .with("count", Fact::count(lengths))
         .with("scale", Fact::ratio(found.value))
         .with("sigma", Fact::ratio(found.sigma));
@@ -128,9 +131,29 @@ mod tests {
             finding(&changes(&of))
         };
         let found = scaled(-0.01).expect("a ratio");
+        let kind = |found: &Finding| {
+            found
+                .facts
+                .get("kind")
+                .and_then(Fact::word)
+                .map(str::to_owned)
+        };
+        assert_eq!(kind(&found).as_deref(), Some("clear"));
+        let found = scaled(0.004).expect("a ratio");
+        assert_eq!(kind(&found).as_deref(), Some("perhaps"));
+        let found = scaled(-0.01).expect("a ratio");
         let scale = found.facts.get("scale").and_then(Fact::value);
         assert!((scale.expect("a number") + 0.01).abs() < 2e-3, "{scale:?}");
         assert!(scaled(0.0).is_none());
+        // A collaborative arm of seven joints has two lengths between its axes.
+        let two: Vec<Dimension> = [0.4, 0.4].iter().map(|l| [*l, 0.008 * l, 1e-4]).collect();
+        let with = |zeros: &[f64]| {
+            let zeros = zeros.iter().map(|e| [0.0, *e, 1e-4]);
+            let all: Vec<Dimension> = two.iter().copied().chain(zeros).collect();
+            finding(&changes(&all))
+        };
+        assert!(with(&ERRORS).is_some());
+        assert!(with(&[]).is_none());
         for wrong in 0..4 {
             let of = LENGTHS.iter().zip(ERRORS).enumerate();
             let of: Vec<Dimension> = of

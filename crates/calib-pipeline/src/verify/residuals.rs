@@ -175,13 +175,14 @@ impl Sample<'_> {
     }
 
     fn body_pose(&self, name: &str, tracker_from_link: &Isometry3<f64>) -> Option<Difference> {
-        let poses = self.tracks[name].in_recording(&self.loaded.name);
+        let track = &self.tracks[name];
+        let poses = track.in_recording(&self.loaded.name);
         let seen = poses.get(self.row).copied().flatten()?;
         let predicted = tracker_from_link * self.robot.mounts.get(name)?;
         let rotation = so3::log(&(seen.rotation.inverse() * predicted.rotation));
         Some(Difference {
             subject: name.to_owned(),
-            position: predicted.translation.vector - seen.translation.vector,
+            position: track.off(&self.loaded.name, &predicted, &seen),
             rotation: Some(rotation.norm()),
         })
     }

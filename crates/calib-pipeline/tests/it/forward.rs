@@ -182,7 +182,11 @@ fn the_predicted_pose_of_every_link_is_the_solver_s() {
         for (link, frame) in model.link_ids().zip(&frames) {
             let seen = predicted.iter().enumerate().map(|(sample, poses)| {
                 let pose = calibration.tracker_from_root * poses[link.index()];
-                PoseObservation { sample, pose }
+                PoseObservation {
+                    sample,
+                    pose,
+                    inverse: false,
+                }
             });
             p.poses(
                 &model.link(link).name,

@@ -75,7 +75,11 @@ fn the_frame_graph_states_the_same_problem() {
     let seen =
         c.b.iter()
             .enumerate()
-            .map(|(sample, b)| PoseObservation { sample, pose: *b })
+            .map(|(sample, b)| PoseObservation {
+                sample,
+                pose: *b,
+                inverse: false,
+            })
             .collect();
     p.poses(
         "body",

@@ -148,6 +148,7 @@ fn likelihood(cell: &Cell, seen: &[Isometry3<f64>]) -> Vector3<f64> {
     let poses = poses.map(|(sample, pose)| PoseObservation {
         sample,
         pose: *pose,
+        inverse: false,
     });
     p.poses("body", frames[0], frames[4], noise, poses.collect());
     let solution = solve(&p, &Settings::plain()).expect("a problem");

@@ -3,7 +3,7 @@
 use super::{Clocks, ParameterValue, TimedPoses, Usage};
 use calib_recording::ColumnMap;
 use calib_urdf::JointId;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// A recording and what it is for.
 #[derive(Debug, Clone, PartialEq)]
@@ -30,6 +30,15 @@ pub struct RecordingSpec {
     pub timing: Option<Timing>,
     /// Where it stands among the recordings of the profile, from 0: taken for the order in which they were made.
     pub place: usize,
+}
+
+impl RecordingSpec {
+    /// The bodies whose columns hold the pose of the tracker in the body.
+    #[must_use]
+    pub fn inverse_bodies(&self) -> BTreeSet<String> {
+        let columns = self.columns.as_ref();
+        columns.map(ColumnMap::inverse_bodies).unwrap_or_default()
+    }
 }
 
 /// The robot's own log of its joints.

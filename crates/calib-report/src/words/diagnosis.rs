@@ -13,7 +13,16 @@ impl Diagnosis {
     /// The diagnosis and the remedy, a sentence or two each; `again` is the command that runs the profile.
     pub(crate) fn words(&self, report: &Report, again: &str) -> [String; 2] {
         match self {
-            Self::LimitBelowNoise { .. } => self.below_noise(again),
+            Self::LimitBelowNoise {
+                limit_name,
+                limit_m,
+                tracker_m,
+                from_residuals,
+                above_stated,
+            } => {
+                let noise = (*tracker_m, *from_residuals, *above_stated);
+                limit_below_noise(limit_name, *limit_m, noise, again)
+            }
             Self::StructuralFault { evidence } | Self::NamedCause { evidence } => of_finding(
                 report, evidence, again,
             )
@@ -62,7 +71,11 @@ impl Diagnosis {
                     ),
                 },
             ],
-            Self::TooFewPoses { .. } => self.too_few_poses(again),
+            Self::TooFewPoses {
+                postures,
+                fitted,
+                tracker_m,
+            } => too_few_poses(*postures, *fitted, *tracker_m, again),
             Self::NoLimits => [
                 "The profile sets no limits, so nothing could be accepted.".to_owned(),
                 format!("Set `solve.limits.held_out_rms_mm`, then run `{again}`."),
@@ -70,90 +83,83 @@ impl Diagnosis {
             Self::Unexplained => unexplained(report, again),
         }
     }
-    /// Of a limit below the noise; nothing for others.
-    fn below_noise(&self, again: &str) -> [String; 2] {
-        let Self::LimitBelowNoise {
-            limit_name,
-            limit_m,
-            tracker_m,
-            from_residuals,
-            above_stated,
-        } = self
-        else {
-            return Default::default();
-        };
-        let [limit, tracker] = [limit_m, tracker_m].map(|m| number::plain(*m, Unit::Meter));
-        let enough = (ROOM * tracker_m * 1e4).ceil() / 10.0;
-        if *from_residuals {
-            return [
-                format!(
-                    "The limit of {limit} is below {tracker}, which the fit found as the noise of one tracker measurement. The profile states none: what is wrong in the recordings or missing in the model is part of it."
-                ),
-                format!(
-                    "State the noise of the tracker, `tracker: {{body_sigma_mm: …, body_sigma_deg: …}}`, so that the fit shows what exceeds it; only if the tracker is that noisy, set `solve.limits.{limit_name}` to {enough} or more. Then run `{again}`."
-                ),
-            ];
-        }
-        if let Some(factor) = above_stated {
-            return [
-                format!(
-                    "The tracker is {} times as noisy as the profile states: the noise of one measurement, {tracker}, is above the limit of {limit}, which no robot can meet so.",
-                    number::fixed(*factor, 1)
-                ),
-                format!(
-                    "Find out why (the tracker's calibration, reflections, loose markers) and record again. If the tracker is that noisy, state its noise in `tracker`, and set `solve.limits.{limit_name}` to {enough} or more, or average several frames per pose. Then run `{again}`."
-                ),
-            ];
-        }
-        [
-            format!(
-                "The limit of {limit} is below the noise of one tracker measurement, {tracker}: no robot can meet it."
-            ),
-            format!(
-                "Set `solve.limits.{limit_name}` to {enough} or more, or average several frames per pose; then run `{again}`."
-            ),
-        ]
-    }
+}
 
-    /// Of an error that the poses do not decide; nothing for others.
-    fn too_few_poses(&self, again: &str) -> [String; 2] {
-        let Self::TooFewPoses {
-            postures,
-            fitted,
-            tracker_m,
-        } = self
-        else {
-            return Default::default();
-        };
-        if let Some(tracker_m) = tracker_m {
-            let needed = postures.map_or_else(String::new, |n| {
-                format!(" This limit would need about {n} validation postures.")
-            });
-            return [
-                format!(
-                    "The error is so near its limit that these poses do not decide, and most of it is the noise of one tracker measurement, {}.",
-                    number::plain(*tracker_m, Unit::Meter)
-                ),
-                format!(
-                    "Average several frames per pose, which lowers that noise, or set a larger limit, then run `{again}`.{needed}"
-                ),
-            ];
-        }
-        [
-            "There are too few poses to decide whether the limit is met.".to_owned(),
-            match postures {
-                Some(n) if *fitted => format!(
-                    "Record more poses for the fit, in which all joints move, and run `{again}`: this error would need about {n} validation postures, a smaller one needs fewer."
-                ),
-                Some(n) => format!(
-                    "Record about {n} validation postures in which all joints move, then run `{again}`."
-                ),
-                None => format!(
-                    "Record more poses in which all joints move, some of them as validation, then run `{again}`."
-                ),
-            },
-        ]
+/// Of a limit in m below the tracker's noise: that noise in m, whether only the residuals tell it, and how many times the stated one it is.
+fn limit_below_noise(
+    limit_name: &str,
+    limit_m: f64,
+    (tracker_m, from_residuals, above_stated): (f64, bool, Option<f64>),
+    again: &str,
+) -> [String; 2] {
+    let [limit, tracker] = [limit_m, tracker_m].map(|m| number::plain(m, Unit::Meter));
+    let enough = (ROOM * tracker_m * 1e4).ceil() / 10.0;
+    if from_residuals {
+        return [
+            format!(
+                "The limit of {limit} is below {tracker}, which the fit found as the noise of one tracker measurement. The profile states none: what is wrong in the recordings or missing in the model is part of it."
+            ),
+            format!(
+                "State the noise of the tracker, `tracker: {{body_sigma_mm: …, body_sigma_deg: …}}`, so that the fit shows what exceeds it; only if the tracker is that noisy, set `solve.limits.{limit_name}` to {enough} or more. Then run `{again}`."
+            ),
+        ];
     }
+    if let Some(factor) = above_stated {
+        return [
+            format!(
+                "The tracker is {} times as noisy as the profile states: the noise of one measurement, {tracker}, is above the limit of {limit}, which no robot can meet so.",
+                number::fixed(factor, 1)
+            ),
+            format!(
+                "Find out why (the tracker's calibration, reflections, loose markers) and record again. If the tracker is that noisy, state its noise in `tracker`, and set `solve.limits.{limit_name}` to {enough} or more, or average several frames per pose. Then run `{again}`."
+            ),
+        ];
+    }
+    [
+        format!(
+            "The limit of {limit} is below the noise of one tracker measurement, {tracker}: no robot can meet it."
+        ),
+        format!(
+            "Set `solve.limits.{limit_name}` to {enough} or more, or average several frames per pose; then run `{again}`."
+        ),
+    ]
+}
+
+/// Of an error that the poses do not decide.
+fn too_few_poses(
+    postures: Option<usize>,
+    fitted: bool,
+    tracker_m: Option<f64>,
+    again: &str,
+) -> [String; 2] {
+    if let Some(tracker_m) = tracker_m {
+        let needed = postures.map_or_else(String::new, |n| {
+            format!(" This limit would need about {n} validation postures.")
+        });
+        return [
+            format!(
+                "The error is so near its limit that these poses do not decide, and most of it is the noise of one tracker measurement, {}.",
+                number::plain(tracker_m, Unit::Meter)
+            ),
+            format!(
+                "Average several frames per pose, which lowers that noise, or set a larger limit, then run `{again}`.{needed}"
+            ),
+        ];
+    }
+    [
+        "There are too few poses to decide whether the limit is met.".to_owned(),
+        match postures {
+            Some(n) if fitted => format!(
+                "Record more poses for the fit, in which all joints move, and run `{again}`: this error would need about {n} validation postures, a smaller one needs fewer."
+            ),
+            Some(n) => format!(
+                "Record about {n} validation postures in which all joints move, then run `{again}`."
+            ),
+            None => format!(
+                "Record more poses in which all joints move, some of them as validation, then run `{again}`."
+            ),
+        },
+    ]
 }
 
 /// A selection that was made would answer the same again.

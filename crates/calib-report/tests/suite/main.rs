@@ -8,4 +8,5 @@ mod page;
 mod parts;
 mod renderers;
 mod scenes;
+mod verdict_facts;
 mod verdicts;

@@ -5,6 +5,7 @@
 //! ```text
 //! marker      e = R p + t − y                                          3, from axes, m      (1)
 //! pose        e = [ Log(R_zᵀ R); R_zᵀ (t − t_z) ]                      6, body axes, rad, m (2)
+//!   inverse   e = [ Log(R_zᵀ R); −Rᵀt + R_zᵀt_z ]                      6, body axes, rad, m (2')
 //! direction   e = E(d)ᵀ R a,  E(d) spans the plane across d            2, rad               (3)
 //! plane       e = nᵀ (R p + t) − h                                     1, m                 (4)
 //! line        e = E(d)ᵀ (R p + t − o)                                  2, m                 (5)

@@ -1,4 +1,7 @@
 //! Body poses: `e = [Log(R_zᵀ R); R_zᵀ (t − t_z)]`, six rows in body axes, rad and m.
+//!
+//! A camera on the robot states where a board beside it is, `to_from_from`. The errors of its angles are those of the board's angles, not of a
+//! lever from the board to the camera, so that the residual is formed there: `e = [Log(R_zᵀ R); −Rᵀt + R_zᵀt_z]`.
 
 use nalgebra::{Isometry3, Matrix6};
 
@@ -22,6 +25,8 @@ pub struct PoseObservation {
     pub sample: usize,
     /// `from_from_to`.
     pub pose: Isometry3<f64>,
+    /// The inverse was measured: noise, residual and deviation are those of `to_from_from`.
+    pub inverse: bool,
 }
 
 /// Noise of a measured pose.
@@ -101,9 +106,12 @@ impl Kind for Poses {
     }
 
     fn residual(&self, item: usize, at: &At<'_>) -> Rows {
-        let z = &self.observations[item].pose;
-        let r_z = z.rotation.to_rotation_matrix();
-        Rows::pose(r_z.matrix(), &z.translation.vector, at)
+        let PoseObservation { pose, inverse, .. } = &self.observations[item];
+        let r_z = pose.rotation.to_rotation_matrix();
+        match inverse {
+            false => Rows::pose(r_z.matrix(), &pose.translation.vector, at),
+            true => Rows::inverse_pose(r_z.matrix(), &pose.translation.vector, at),
+        }
     }
 
     fn covariance(&self, _item: usize, add: &mut dyn FnMut(usize, usize, GroupId, f64)) {
@@ -112,5 +120,33 @@ impl Kind for Poses {
 
     fn deviation(&self, e: &[f64]) -> Deviation {
         deviation(e)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use nalgebra::Vector3;
+
+    use super::*;
+    use crate::graph::measurement::tests::assert_jacobian;
+
+    #[test]
+    fn derivatives_are_those_of_the_residual_in_both_directions() {
+        for inverse in [false, true] {
+            let pose = Isometry3::new(Vector3::new(0.2, -0.1, 0.7), Vector3::new(0.4, 0.3, -0.2));
+            let noise = PoseNoise::Split {
+                orientation: GroupId::of(0),
+                position: GroupId::of(1),
+            };
+            let observations = vec![PoseObservation {
+                sample: 0,
+                pose,
+                inverse,
+            }];
+            assert_jacobian(&Poses {
+                noise,
+                observations,
+            });
+        }
     }
 }

@@ -96,19 +96,49 @@ impl Rows {
     /// e = [Log(R_zᵀR); R_zᵀ(t − t_z)],   de = [Jr⁻¹ ω; R_zᵀR v]
     /// ```
     pub(crate) fn pose(r_z: &Matrix3<f64>, t_z: &Vector3<f64>, at: &At<'_>) -> Self {
-        let mut out = Self::zeros();
         let relative = r_z.tr_mul(at.r);
-        let log = so3::log(&so3::quaternion_of(
-            &nalgebra::Rotation3::from_matrix_unchecked(relative),
-        ));
+        let mut out = Self::rotation(&relative);
         let shift = r_z.tr_mul(&(at.t - t_z));
+        for i in 0..3 {
+            out.e[3 + i] = shift[i];
+            for c in 0..3 {
+                out.m[3 + i][3 + c] = relative[(i, c)];
+            }
+        }
+        out
+    }
+
+    /// Six rows of the inverse of a pose against the inverse of a measured one:
+    ///
+    /// ```text
+    /// e = [Log(R_zᵀR); p − p_z],  p = −Rᵀt,      de = [Jr⁻¹ ω; [p]ₓ ω − v]
+    /// ```
+    pub(crate) fn inverse_pose(r_z: &Matrix3<f64>, t_z: &Vector3<f64>, at: &At<'_>) -> Self {
+        let mut out = Self::rotation(&r_z.tr_mul(at.r));
+        let place = -at.r.tr_mul(at.t);
+        let shift = place + r_z.tr_mul(t_z);
+        let by_rotation = so3::skew(&place);
+        for i in 0..3 {
+            out.e[3 + i] = shift[i];
+            out.m[3 + i][3 + i] = -1.0;
+            for c in 0..3 {
+                out.m[3 + i][c] = by_rotation[(i, c)];
+            }
+        }
+        out
+    }
+
+    /// Three rows of Log(R_zᵀR).
+    fn rotation(relative: &Matrix3<f64>) -> Self {
+        let mut out = Self::zeros();
+        let log = so3::log(&so3::quaternion_of(
+            &nalgebra::Rotation3::from_matrix_unchecked(*relative),
+        ));
         let jr = so3::right_jacobian_inverse(&log);
         for i in 0..3 {
             out.e[i] = log[i];
-            out.e[3 + i] = shift[i];
             for c in 0..3 {
                 out.m[i][c] = jr[(i, c)];
-                out.m[3 + i][3 + c] = relative[(i, c)];
             }
         }
         out

@@ -64,7 +64,11 @@ fn problem(markers: usize) -> Problem {
         position,
     };
     let poses = (0..n as usize)
-        .map(|sample| PoseObservation { sample, pose: x })
+        .map(|sample| PoseObservation {
+            sample,
+            pose: x,
+            inverse: false,
+        })
         .collect();
     p.poses("arm", base, b, noise, poses);
     p

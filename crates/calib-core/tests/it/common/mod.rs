@@ -409,6 +409,7 @@ impl Chain {
                 PoseObservation {
                     sample: s,
                     pose: self.tracker_from_body(q, &extra) * jitter(rng, orientation, position),
+                    inverse: false,
                 }
             })
             .collect();

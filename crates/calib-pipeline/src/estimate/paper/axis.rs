@@ -90,7 +90,7 @@ impl Task<'_> {
             .map(|r| Some(body_pose(&r.tracker_from_body)))
             .collect();
         let mut motion = MotionData::poses(&poses);
-        motion.sigma_t_m = tracker.body_sigma;
+        motion.sigma_t_m = self.track.position_sigma(tracker);
         motion.sigma_r_rad = tracker.body_sigma_rad;
         motion.angles_rad = rows
             .iter()

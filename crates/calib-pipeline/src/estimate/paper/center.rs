@@ -79,7 +79,7 @@ impl Task<'_> {
                     .map(|p| p.map(|p| body_pose(&p)))
                     .collect();
                 let mut motion = MotionData::poses(&poses);
-                motion.sigma_t_m = tracker.body_sigma;
+                motion.sigma_t_m = self.track.position_sigma(tracker);
                 motion.sigma_r_rad = tracker.body_sigma_rad;
                 motion
             }

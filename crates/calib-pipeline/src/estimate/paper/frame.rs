@@ -41,7 +41,7 @@ impl Task<'_> {
                 proximal: FrameAxis::Z,
                 distal: FrameAxis::X,
             },
-            sigma_t: tracker.body_sigma,
+            sigma_t: self.track.position_sigma(tracker),
             sigma_r: tracker.body_sigma_rad,
             ..Options::default()
         };

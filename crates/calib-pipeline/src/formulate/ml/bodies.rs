@@ -73,12 +73,8 @@ pub(super) fn add_bodies(
         if as_pose(name) {
             for level in &levels {
                 let Some(noise) = &level.bodies else { continue };
-                let poses = seen(level, formulation).into_iter().filter_map(
-                    |(sample, (recording, row))| {
-                        let pose = (*track.in_recording(&recording).get(row)?)?;
-                        Some(PoseObservation { sample, pose })
-                    },
-                );
+                let seen = seen(level, formulation).into_iter();
+                let poses = seen.filter_map(|at| pose_seen(track, at));
                 let poses: Vec<PoseObservation> = poses.collect();
                 if only || !poses.is_empty() {
                     let (problem, tracker) = (&mut formulation.problem, formulation.tracker);
@@ -152,6 +148,18 @@ fn levels(
         formulation.noise.body_position = Some(*position);
     }
     levels
+}
+
+/// A body in one row of a recording, by sample.
+fn pose_seen(
+    track: &BodyTrack,
+    (sample, (recording, row)): (usize, (String, usize)),
+) -> Option<PoseObservation> {
+    Some(PoseObservation {
+        sample,
+        pose: (*track.in_recording(&recording).get(row)?)?,
+        inverse: track.inverse.contains(&recording),
+    })
 }
 
 /// A marker in one row.

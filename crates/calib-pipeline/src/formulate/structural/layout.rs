@@ -130,7 +130,7 @@ impl<'a> Layout<'a> {
                 let tracker = &self.inputs.robot.profile.tracker;
                 poses.iter().any(Option::is_some).then(|| Measured::Poses {
                     tracker_from_body: poses,
-                    sigma_position: tracker.body_sigma.unwrap_or(BODY_SIGMA.0),
+                    sigma_position: track.position_sigma(tracker).unwrap_or(BODY_SIGMA.0),
                     sigma_orientation: tracker.body_sigma_rad.unwrap_or(BODY_SIGMA.1),
                 })
             }

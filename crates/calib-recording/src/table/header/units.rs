@@ -7,7 +7,7 @@ use crate::error::{Against, At, Placed, Problem};
 use crate::model::{JointColumn, JointUnit};
 use crate::table::stated_unit::{StatedUnit, UnitRow};
 use crate::units::{AngleUnit, LengthUnit, TimeUnit};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// What a column is read as.
 #[derive(Clone, Copy, PartialEq)]
@@ -104,6 +104,12 @@ impl Layout {
             ));
         }
         Ok(())
+    }
+
+    /// The bodies whose columns hold the pose of the tracker in the body.
+    pub(in crate::table) fn inverse_bodies(&self) -> BTreeSet<String> {
+        let inverse = self.bodies.iter().filter(|plan| plan.inverted);
+        inverse.map(|plan| plan.name.clone()).collect()
     }
 
     /// The column of each joint, with the unit in which it is read.

@@ -90,6 +90,7 @@ impl Rows<'_> {
         Ok(Recording {
             meta: Meta {
                 joint_columns: self.layout.joint_columns(),
+                inverse_bodies: self.layout.inverse_bodies(),
                 conversions: self.layout.conversions,
                 findings,
                 ..Meta::default()
