@@ -1,5 +1,6 @@
 //! Tail probabilities of the distributions that observability tests use.
 
+use statrs::distribution::{DiscreteCDF, Hypergeometric};
 use statrs::function::{beta::checked_beta_reg, erf::erfc, gamma::checked_gamma_ur};
 
 /// Above this many degrees of freedom on both sides the cube roots are normal to six digits, and the
@@ -24,6 +25,16 @@ pub fn f_tail(x: f64, d1: f64, d2: f64) -> f64 {
         return 0.0;
     }
     checked_beta_reg(0.5 * d2, 0.5 * d1, z.min(1.0)).unwrap_or(1.0)
+}
+
+/// P(k or more) of the marked ones among `drawn` of `all`, of which `marked` are marked: hypergeometric; 1 for numbers that contradict each other.
+#[must_use]
+pub fn hypergeometric_tail(all: usize, marked: usize, drawn: usize, k: usize) -> f64 {
+    let [all, marked, drawn] = [all, marked, drawn].map(|n| n as u64);
+    match (k.checked_sub(1), Hypergeometric::new(all, marked, drawn)) {
+        (Some(fewer), Ok(of)) => of.sf(fewer as u64),
+        _ => 1.0,
+    }
 }
 
 /// P(χ² ≥ x) with `dof` degrees of freedom.
@@ -98,6 +109,15 @@ mod tests {
         for (dof, value) in [(Some(5.0), 2.5706), (Some(2.0), 4.3027), (None, 1.9600)] {
             assert!((t_quantile(0.05, dof) - value).abs() < 1e-4, "{dof:?}");
         }
+    }
+
+    #[test]
+    fn draws_without_putting_back() {
+        // 10 · 595 + 5 · 35 + 1 of the 658 008 fives of 40 hold three, four or five of five.
+        let exact = 6126.0 / 658_008.0;
+        assert!((hypergeometric_tail(40, 5, 5, 3) / exact - 1.0).abs() < 1e-9);
+        assert_eq!(hypergeometric_tail(40, 5, 5, 0), 1.0);
+        assert_eq!(hypergeometric_tail(40, 50, 5, 1), 1.0);
     }
 
     #[test]

@@ -90,9 +90,11 @@ impl ShardError {
     #[must_use]
     pub fn remedy(&self) -> &'static str {
         match &*self.fault {
-            ShardFault::Table(TableFault::Unreadable(_)) => {
-                "correct the path, or grant read permission"
-            }
+            ShardFault::Table(TableFault::Unreadable(error)) => match error.kind() {
+                std::io::ErrorKind::IsADirectory => "name the files in it",
+                std::io::ErrorKind::PermissionDenied => "grant read permission",
+                _ => "correct the path",
+            },
             ShardFault::Foreign(_) => {
                 "leave it out, or run that shard again with the settings and inputs of the others"
             }

@@ -172,8 +172,8 @@ super::topic! {
     /// Measured poses have the errors of their inverses, or the other way round.
     NOISE_OF_INVERSE = "noise-of-inverse" {
         "body_sees": Info,
-            "The errors of these poses are those of an instrument on the body that sees the tracker's frame, such as a camera before a board: an error of an angle moves the body about that frame. The fit weighs them so, and the σ of the tracker is that of the frame as the body sees it.",
-            "No action is needed.";
+            "The errors of these poses are those of an instrument on the body that sees the tracker's frame, such as a camera before a board: an error of an angle moves the body about that frame. A tracker that turns a little from row to row makes the same errors. The fit weighs them so, and the σ of the tracker is that of the frame as the body sees it.",
+            "No action is needed if the body is such an instrument. If a tracker beside the robot sees it, check that the tracker stands still.";
         "tracker_sees": Info,
             "The columns state where the tracker's frame is in the body, but their errors are those of a tracker that sees the body: an error of an angle does not move it. The fit weighs them so, and the σ of the tracker is that of the body as the tracker sees it.",
             "No action is needed.";

@@ -4,7 +4,6 @@ use std::collections::BTreeMap;
 
 use calib_core::{ParameterEstimate, ParameterKind, Settings};
 use calib_finding::{About, Fact, Finding, Severity, Unit, catalog};
-use calib_profile::BodyKind;
 use calib_report::{Status, Unobservable};
 
 use crate::error::PipelineError;
@@ -62,16 +61,9 @@ pub fn likelihood(
     };
     let place = places::likeliest(inputs, checked, &settings, progress)?;
     checked.findings.extend(place);
-    let poses = inputs.robot.profile.bodies.values();
-    let any_pose = poses
-        .map(|body| &body.kind)
-        .any(|kind| *kind == BodyKind::Pose);
-    // Rows are judged again with the noise of the other end.
-    let as_read = any_pose.then(|| (inputs.clone(), checked.tracks.clone()));
-    let mut found = sided(inputs, checked, &how, progress)?;
-    if let Some(as_read) = as_read {
-        found = from_its_side(inputs, checked, (&how, as_read), found, progress)?;
-    }
+    let as_read = which_side::matters(inputs).then(|| (inputs.clone(), checked.tracks.clone()));
+    let found = sided(inputs, checked, &how, progress)?;
+    let found = from_its_side(inputs, checked, (&how, as_read), found, progress)?;
     let (mut registered, mut fit, mut of_rows) =
         before_cameras(inputs, checked, &how, found, progress)?;
     for _ in 0..ALIGNMENTS {
@@ -153,14 +145,16 @@ fn sided(
 fn from_its_side(
     inputs: &mut Inputs,
     checked: &mut Checked,
-    (how, as_read): (&How<'_>, (Inputs, BTreeMap<String, BodyTrack>)),
+    (how, as_read): (&How<'_>, Option<(Inputs, BTreeMap<String, BodyTrack>)>),
     found: Fits,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Fits, PipelineError> {
-    let told = which_side::told(&found.1);
+    let told = which_side::told(inputs, &found.1);
     if told.is_empty() {
         return Ok(found);
     }
+    // Rows are judged again with the noise of the other end.
+    let as_read = as_read.unwrap_or_else(|| (inputs.clone(), checked.tracks.clone()));
     let inputs_of_found = std::mem::replace(inputs, as_read.0);
     let tracks_of_found = std::mem::replace(&mut checked.tracks, as_read.1);
     which_side::exchange(inputs, &mut checked.tracks, &told);

@@ -8,6 +8,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use calib_finding::{Finding, Subject, catalog};
+use calib_profile::BodyKind;
 
 use crate::formulate::formulation::MlFit;
 use crate::prepare::inputs::Inputs;
@@ -16,14 +17,31 @@ use crate::prepare::tracks::BodyTrack;
 /// Logarithm of the likelihood ratio from which the other end is tried.
 const TRIED: f64 = 8.0;
 
+/// Longer recordings are not copied to have their rows judged again.
+const COPIED: usize = 20_000;
+
+/// Whether the recordings have poses whose other end may be tried, and few enough rows to be kept as they were read.
+#[must_use]
+pub(crate) fn matters(inputs: &Inputs) -> bool {
+    let mut bodies = inputs.robot.profile.bodies.values();
+    let rows = inputs.recordings.values().map(|loaded| loaded.poses.len());
+    bodies.any(|body| body.kind == BodyKind::Pose) && rows.sum::<usize>() <= COPIED
+}
+
 /// Bodies whose poses have the errors of the other end.
 #[must_use]
-pub(crate) fn told(fit: &MlFit) -> BTreeSet<String> {
+pub(crate) fn told(inputs: &Inputs, fit: &MlFit) -> BTreeSet<String> {
+    let bodies = &inputs.robot.profile.bodies;
+    // What was computed from markers was seen as these.
+    let is_measured =
+        |name: &str| matches!(bodies.get(name), Some(body) if body.kind == BodyKind::Pose);
     let measurements = fit.formulation.problem.measurements();
     let mut by_body: BTreeMap<&str, f64> = BTreeMap::new();
     for (measurement, by) in fit.solution.other_side_likelier_by() {
         let name = measurements[measurement.index()].name.as_str();
-        *by_body.entry(name).or_default() += by;
+        if is_measured(name) {
+            *by_body.entry(name).or_default() += by;
+        }
     }
     let told = by_body.into_iter().filter(|(_, by)| *by > TRIED);
     told.map(|(name, _)| name.to_owned()).collect()

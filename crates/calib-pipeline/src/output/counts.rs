@@ -2,8 +2,10 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use calib_estimator::chance::hypergeometric_tail;
 use calib_profile::{BodyKind, ByRow, Contact, Usage};
 use calib_report::{HeldOut, Part, RejectedFor, RejectedPart, Share, Unit};
+use calib_urdf::JointId;
 
 use crate::formulate::formulation::MlFit;
 use crate::prepare::inputs::{Inputs, Loaded};
@@ -193,6 +195,9 @@ fn share(fates: impl IntoIterator<Item = Fate>) -> Share {
 const WHOLE: f64 = 0.5;
 /// …and it has at least so many measurements: fewer are rejected together by chance.
 const FEWEST: usize = 5;
+/// Expected number of ranges of a recording with so many rejected rows, were these anywhere: of 40 rows of which 5 are gross, 3 lie in one range of some
+/// joint in every second recording.
+const BY_CHANCE: f64 = 0.01;
 /// Ranges of a joint that are looked at, of equal width.
 const RANGES: usize = 10;
 
@@ -234,6 +239,13 @@ pub(crate) fn rejected_parts(inputs: &Inputs, tracks: &Tracks) -> Vec<RejectedPa
     out
 }
 
+/// Whether among so many ranges one has so many of all rejected rows by chance.
+fn is_chance(all: Share, of_range: Share, ranges: usize) -> bool {
+    let chance = hypergeometric_tail(all.of, all.part, of_range.of, of_range.part);
+    chance * ranges as f64 >= BY_CHANCE
+}
+
+/// The tenth of a joint's range in which most was rejected, where so many are not rejected there by chance.
 fn rejected_ranges(
     inputs: &Inputs,
     loaded: &Loaded,
@@ -241,8 +253,8 @@ fn rejected_ranges(
     whole: &dyn Fn(&Share) -> bool,
 ) -> Option<RejectedPart> {
     let model = &inputs.robot.model;
-    let mut worst: Option<RejectedPart> = None;
     let rows = rows(tracks, loaded.poses.len());
+    let mut ranges: Vec<(JointId, f64, f64, Share)> = Vec::new();
     for joint in model.independent_joints() {
         let at: Vec<(f64, Fate)> = loaded
             .q
@@ -260,25 +272,44 @@ fn rejected_ranges(
             let from = low + range as f64 * width;
             let inside = |q: f64| ((q - low) / width).min(RANGES as f64 - 1.0) as usize == range;
             let rejected = share(at.iter().filter(|a| inside(a.0)).map(|a| a.1));
-            let larger = worst
-                .as_ref()
-                .is_none_or(|w| rejected.part > w.rejected.part);
-            if whole(&rejected) && larger {
-                worst = Some(RejectedPart {
-                    part: Part::Range {
-                        joint: model.joint(joint).name.clone(),
-                        from,
-                        to: from + width,
-                        unit: if model.joint(joint).kind.turns() {
-                            Unit::Radian
-                        } else {
-                            Unit::Meter
-                        },
-                    },
-                    rejected,
-                });
-            }
+            ranges.push((joint, from, from + width, rejected));
         }
     }
-    worst
+    ranges.retain(|(.., rejected)| rejected.of >= FEWEST);
+    let all = share(rows.iter().copied());
+    let looked_at = ranges.len();
+    ranges.retain(|(.., rejected)| whole(rejected) && !is_chance(all, *rejected, looked_at));
+    // Of as many the first.
+    let worst = ranges.into_iter().rev();
+    let (joint, from, to, rejected) = worst.max_by_key(|(.., rejected)| rejected.part)?;
+    let joint = model.joint(joint);
+    let unit = match joint.kind.turns() {
+        true => Unit::Radian,
+        false => Unit::Meter,
+    };
+    let joint = joint.name.clone();
+    Some(RejectedPart {
+        part: Part::Range {
+            joint,
+            from,
+            to,
+            unit,
+        },
+        rejected,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of 40 rows: a few gross ones meet in one range of some joint; those that a cable holds up are all there.
+    #[test]
+    fn gross_rows_that_meet_in_a_range_are_not_that_ranges() {
+        let of_range = |part| Share { part, of: 5 };
+        assert!(is_chance(Share { part: 5, of: 40 }, of_range(3), 60));
+        assert!(is_chance(Share { part: 9, of: 40 }, of_range(4), 60));
+        assert!(!is_chance(Share { part: 5, of: 40 }, of_range(5), 60));
+        assert!(!is_chance(Share { part: 6, of: 40 }, of_range(5), 60));
+    }
 }
