@@ -141,11 +141,14 @@ fn sided(
     Ok(found)
 }
 
+/// Recordings before their rows were judged, and the bodies in them.
+type AsRead = (Inputs, BTreeMap<String, BodyTrack>);
+
 /// What was found, or again with the poses of some bodies measured from their other end, where the recordings say so.
 fn from_its_side(
     inputs: &mut Inputs,
     checked: &mut Checked,
-    (how, as_read): (&How<'_>, Option<(Inputs, BTreeMap<String, BodyTrack>)>),
+    (how, as_read): (&How<'_>, Option<AsRead>),
     found: Fits,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Fits, PipelineError> {
