@@ -17,7 +17,7 @@ Program = Callable[..., subprocess.CompletedProcess[str]]
 
 @pytest.fixture(scope="session")
 def program() -> Program:
-    """Runs the program `calib` in the repository: the one that `CALIB_PROGRAM` names, else that of the package. Lines are as long as they are."""
+    """Runs the program `calib` in the repository: the one that `CALIB_PROGRAM` names, else that of the package. Its messages are not wrapped."""
     named = os.environ.get("CALIB_PROGRAM")
     command = [named] if named else [sys.executable, "-m", "calib"]
     unbound = {name: value for name, value in os.environ.items() if name != "COLUMNS"}

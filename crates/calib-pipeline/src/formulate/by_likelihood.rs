@@ -137,7 +137,10 @@ fn sided(
         progress("fit again with the sides that joints came from");
         found = fits(inputs, checked, how, progress)?;
     }
-    checked.findings.extend(starts::findings(inputs));
+    // They may have been said of a fit before this one.
+    let told = starts::findings(inputs);
+    checked.findings.retain(|finding| !told.contains(finding));
+    checked.findings.extend(told);
     Ok(found)
 }
 

@@ -195,8 +195,8 @@ fn share(fates: impl IntoIterator<Item = Fate>) -> Share {
 const WHOLE: f64 = 0.5;
 /// …and it has at least so many measurements: fewer are rejected together by chance.
 const FEWEST: usize = 5;
-/// Expected number of ranges of a recording with so many rejected rows, were these anywhere: of 40 rows of which 5 are gross, 3 lie in one range of some
-/// joint in every second recording.
+/// Expected number of ranges of a recording with so many rejected rows, were these anywhere: of 40 rows of which 5 are gross, 3 lie in one of 60 ranges of five
+/// rows in four of ten recordings.
 const BY_CHANCE: f64 = 0.01;
 /// Ranges of a joint that are looked at, of equal width.
 const RANGES: usize = 10;
