@@ -47,6 +47,7 @@ mod mirrored;
 mod month;
 mod notations;
 mod occluded;
+mod one_camera;
 mod one_marker;
 mod outputs;
 mod pan_tilt;

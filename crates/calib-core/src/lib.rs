@@ -140,6 +140,7 @@ mod solve;
 pub use nalgebra;
 
 pub use analysis::admit::Admission;
+pub use analysis::along_sight::{AlongSight, Likelier};
 pub use analysis::bounds::Unbounded;
 pub use analysis::change::contest::{Contest, Suspect};
 pub use analysis::change::{

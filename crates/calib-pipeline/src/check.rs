@@ -154,7 +154,7 @@ fn noise_of(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Vec<BodyNo
     let of = bodies.map(|body| BodyNoise {
         body: body.clone(),
         sigma_m: tracks.get(body).and_then(|track| track.marker_sigma),
-        stated_m: inputs.robot.profile.tracker.marker_sigma,
+        stated_m: inputs.robot.profile.tracker.marker_coordinate(),
     });
     of.collect()
 }

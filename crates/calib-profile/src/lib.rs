@@ -37,8 +37,8 @@ pub use profile::{
     FromRoot, JointException, JointFree, JointFreeSet, KeepOut, Limits, LinkTransform, Load, Loop,
     Method, Noise, Orientation, Origin, OriginFreeSet, Outputs, ParameterValue, PlanSpec, Plugin,
     PointChoice, Prior, Profile, Protocol, RecordingSpec, RobotLoad, RobotLog, SharedWidth,
-    SimErrors, SimMount, SimNoise, Simulation, Solve, Split, Spots, StartFrom, Steps, SweptAxis,
-    TimedPoses, Timing, Tip, Touched, Tracker, UpAxis, Usage,
+    SightSigma, SimErrors, SimMount, SimNoise, Simulation, Solve, Split, Spots, StartFrom, Steps,
+    SweptAxis, TimedPoses, Timing, Tip, Touched, Tracker, UpAxis, Usage,
 };
 pub use schema::json_schema;
 

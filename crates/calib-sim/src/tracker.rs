@@ -2,10 +2,11 @@
 
 use std::collections::BTreeSet;
 
+use calib_core::measurement::error_of_sight;
 use calib_geometry::{Twist, se3};
 use calib_profile::{Body, BodyKind, Profile, RecordingSpec, Simulation};
 use calib_recording::Poses;
-use nalgebra::{Cholesky, Isometry3, Matrix3, Point3};
+use nalgebra::{Cholesky, Isometry3, Matrix3, Point3, Vector3};
 use rand::RngExt;
 use rand_chacha::ChaCha12Rng;
 
@@ -108,13 +109,23 @@ impl<'a> Tracker<'a> {
             let tracker_from_body = self.tracker_from_body(name, body, root_from_link);
             match &body.kind {
                 BodyKind::Pose => {
+                    let inverse = self.inverse.contains(name);
+                    // The instrument's line of sight in the axes of the error.
+                    let there = tracker_from_body.translation.vector;
+                    let line = match inverse {
+                        false => tracker_from_body.rotation.inverse() * there,
+                        true => there,
+                    };
+                    let [angle, position] = [noise.body.angle, noise.body.position];
+                    let mut drawn =
+                        |across: f64, along| error(rng, (across, along), &line, noise_times);
                     let error = Twist::new(
-                        normal3(rng, noise.body.angle * noise_times),
-                        normal3(rng, noise.body.position * noise_times),
+                        drawn(angle, noise.body_sight_rad),
+                        drawn(position, noise.body_sight),
                     );
                     let seen = rng.random::<f64>() >= noise.occluded;
                     let error = se3::exp(&error);
-                    let sample = seen.then(|| match self.inverse.contains(name) {
+                    let sample = seen.then(|| match inverse {
                         false => tracker_from_body * error,
                         true => error.inverse() * tracker_from_body,
                     });
@@ -123,9 +134,10 @@ impl<'a> Tracker<'a> {
                 BodyKind::Markers { names, .. } => {
                     for marker in names {
                         let p_body = self.plan.mounts[name].markers[marker];
-                        let error = normal3(rng, noise.marker * noise_times);
-                        let seen = rng.random::<f64>() >= noise.occluded;
                         let at = tracker_from_body * p_body;
+                        let levels = (noise.marker, noise.marker_sight);
+                        let error = error(rng, levels, &at.coords, noise_times);
+                        let seen = rng.random::<f64>() >= noise.occluded;
                         let error = self.factor(&at).map_or(error, |factor| factor * error);
                         let sample = seen.then(|| at + error);
                         let track = poses.markers.entry(marker.clone()).or_default();
@@ -134,5 +146,18 @@ impl<'a> Tracker<'a> {
                 }
             }
         }
+    }
+}
+
+/// Three components with σ across a line and, where that differs, along it.
+fn error(
+    rng: &mut ChaCha12Rng,
+    (across, along): (f64, Option<f64>),
+    line: &Vector3<f64>,
+    times: f64,
+) -> Vector3<f64> {
+    match along {
+        None => normal3(rng, across * times),
+        Some(along) => error_of_sight(&normal3(rng, 1.0), line, [across * times, along * times]),
     }
 }

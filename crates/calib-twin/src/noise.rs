@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 
-use calib_core::measurement::PoseNoise;
+use calib_core::measurement::{Growth, PoseNoise, growth};
 use calib_core::{EdgeKind, FrameId, GroupId, MeasurementKind, Problem};
 use calib_pipeline::formulate::formulation::{Formulation, MlFit};
 use calib_urdf::{JointId, RobotModel};
@@ -14,10 +14,35 @@ pub struct Noise {
     pub markers: BTreeMap<String, f64>,
     /// Rotation (rad) and translation (m) of a body that is measured as a pose, each coordinate, by body.
     pub bodies: BTreeMap<String, [f64; 2]>,
+    /// The same along the line of sight, where it has levels of its own, by body.
+    pub sights: BTreeMap<String, SightNoise>,
     /// Rotation (rad) and translation (m) of a marker body on its link, drawn for each posture, by body.
     pub poses: BTreeMap<String, [f64; 2]>,
     /// Reading of a joint, rad or m, drawn for each posture.
     pub joints: BTreeMap<JointId, f64>,
+}
+
+/// Standard deviations along a line of sight; those of [`Noise::bodies`] and [`Noise::markers`] are then the ones across it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SightNoise {
+    /// Of positions along it, m.
+    pub along: f64,
+    /// Of orientations about it, rad.
+    pub about: f64,
+    /// How they grow with the distance.
+    pub growth: Growth,
+}
+
+impl SightNoise {
+    /// σ across the line and along it of positions, and of orientations about the axes across it and along it, of what is at a distance, m.
+    pub(crate) fn levels(&self, [turn, shift]: [f64; 2], distance: f64) -> [[f64; 2]; 2] {
+        let [across, along] = growth(self.growth.positions, distance);
+        let [about, tilt] = growth(self.growth.orientations, distance);
+        [
+            [turn * tilt, self.about * about],
+            [shift * across, self.along * along],
+        ]
+    }
 }
 
 impl Noise {
@@ -38,6 +63,19 @@ impl Noise {
         let problem = &formulation.problem;
         let mut noise = Self::default();
         for measurement in problem.measurements() {
+            let sight = match &measurement.kind {
+                MeasurementKind::Markers(of) => of.sight,
+                MeasurementKind::Poses(of) => of.sight,
+                _ => None,
+            };
+            if let Some(sight) = sight {
+                let levels = SightNoise {
+                    along: sigma(sight.along),
+                    about: sight.about.map_or(0.0, sigma),
+                    growth: sight.growth,
+                };
+                noise.sights.insert(measurement.name.clone(), levels);
+            }
             match &measurement.kind {
                 MeasurementKind::Markers(markers) => {
                     for o in &markers.observations {
@@ -86,7 +124,10 @@ impl Noise {
         let pairs = self.bodies.values_mut().chain(self.poses.values_mut());
         let of_pairs = pairs.flat_map(|pair| pair.iter_mut());
         let single = self.markers.values_mut().chain(self.joints.values_mut());
-        of_pairs.chain(single).for_each(|sigma| *sigma *= factor);
+        let sights = self.sights.values_mut();
+        let of_sights = sights.flat_map(|sight| [&mut sight.along, &mut sight.about]);
+        let all = of_pairs.chain(single).chain(of_sights);
+        all.for_each(|sigma| *sigma *= factor);
         self
     }
 }

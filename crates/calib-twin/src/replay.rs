@@ -10,6 +10,7 @@
 //! noise of a body's pose on its link, Σ the shape of a marker's covariance where one is known.
 
 use calib_core::EffectKind;
+use calib_core::measurement::error_of_sight;
 use calib_geometry::{Twist, se3};
 use calib_pipeline::formulate::kinematics::Calibration;
 use calib_pipeline::prepare::conditions::conditions;
@@ -102,7 +103,21 @@ impl Replay<'_> {
                     let seen = seen.and_then(|track| track.get_mut(row)?.as_mut());
                     if let (Some(seen), Some(mount)) = (seen, mount) {
                         let levels = self.noise.bodies.get(name).copied();
-                        let (there, error) = (link * mount * slip, drawn(levels, rng));
+                        let there = link * mount * slip;
+                        let at = there.translation.vector;
+                        let line = match inverse {
+                            false => there.rotation.inverse() * at,
+                            true => at,
+                        };
+                        let error = match self.noise.sights.get(name).zip(levels) {
+                            None => drawn(levels, rng),
+                            Some((sight, levels)) => {
+                                let [turn, shift] = sight.levels(levels, line.norm());
+                                let turn = error_of_sight(&vector(rng), &line, turn);
+                                let shift = error_of_sight(&vector(rng), &line, shift);
+                                se3::exp(&Twist::new(turn, shift))
+                            }
+                        };
                         *seen = match inverse {
                             false => there * error,
                             true => error.inverse() * there,
@@ -123,9 +138,20 @@ impl Replay<'_> {
                         let at = self.on_link(robot, (name, body), (i, marker));
                         if let (Some(seen), Some(at)) = (seen, at) {
                             let sigma = self.noise.markers.get(marker).copied();
-                            let own = || shape * vector(rng) * sigma.unwrap_or(0.0);
+                            let sigma = sigma.unwrap_or(0.0);
+                            let there = link * (moved * at);
+                            let sight = self.noise.sights.get(name);
+                            let own = || match (shape, sight) {
+                                (Some(shape), _) => shape * vector(rng) * sigma,
+                                (None, None) => vector(rng) * sigma,
+                                (None, Some(sight)) => {
+                                    let line = there.coords;
+                                    let [_, shift] = sight.levels([0.0, sigma], line.norm());
+                                    error_of_sight(&vector(rng), &line, shift)
+                                }
+                            };
                             let error = errors.as_ref().map_or_else(own, |all| all[i]);
-                            *seen = link * (moved * at) + error;
+                            *seen = there + error;
                         }
                     }
                 }
@@ -182,10 +208,9 @@ fn set_noise(
 }
 
 /// A factor of the shape of a marker's covariance.
-fn shape(loaded: &Loaded, marker: &str, row: usize) -> Matrix3<f64> {
+fn shape(loaded: &Loaded, marker: &str, row: usize) -> Option<Matrix3<f64>> {
     let shape = loaded.shapes.get(marker).and_then(|s| *s.get(row)?);
-    let root = shape.and_then(Cholesky::new).map(|root| root.l());
-    root.unwrap_or_else(Matrix3::identity)
+    shape.and_then(Cholesky::new).map(|root| root.l())
 }
 
 fn vector(rng: &mut ChaCha12Rng) -> Vector3<f64> {

@@ -1,6 +1,7 @@
 //! What a minimum means: covariance, observability, goodness of fit, prediction of new poses.
 
 pub(crate) mod admit;
+pub(crate) mod along_sight;
 pub(crate) mod beginning;
 pub(crate) mod bounds;
 pub(crate) mod change;

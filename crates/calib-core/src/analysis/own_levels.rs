@@ -244,8 +244,10 @@ impl Solution {
                 if let MeasurementKind::Markers(markers) = &problem.measurements[o.measurement].kind
                     && !off.contains(&(o.measurement, sample))
                 {
-                    let error = [0, 1, 2].map(|axis| rows.r[first + axis]);
-                    let seen = (markers.observations[o.item].point, error);
+                    let error = problem.measurements[o.measurement]
+                        .kind
+                        .stated(o.item, &rows.r[first..]);
+                    let seen = (markers.observations[o.item].point, error.into());
                     at[o.measurement].entry(sample).or_default().push(seen);
                 }
             }

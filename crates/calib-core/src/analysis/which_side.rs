@@ -11,8 +11,6 @@
 //! e' are the lengths of the other direction (but for the sign), to first order in the errors, and Λ is by how much the logarithm of the
 //! likelihood is larger with them, each direction with the σ that fits it best: φ and e change with a determinant of 1.
 
-use nalgebra::Vector3;
-
 use crate::analysis::solution::Solution;
 use crate::graph::ids::MeasurementId;
 use crate::graph::measurement::{MeasurementKind, PoseNoise};
@@ -47,7 +45,7 @@ impl Solution {
                 if !matches!(poses.noise, PoseNoise::Split { .. }) {
                     continue;
                 }
-                let three = |at: usize| Vector3::from_fn(|i, _| rows.r[first + at + i]);
+                let three = |at: usize| kind.stated(o.item, &rows.r[first + at..]);
                 let (angles, lengths) = (three(0), three(3));
                 let lever = poses.observations[o.item].pose.inverse().translation.vector;
                 let others = lengths + angles.cross(&lever);

@@ -124,7 +124,9 @@ fn of_measurement(
 fn is_alike(measurement: &Measurement) -> bool {
     match &measurement.kind {
         MeasurementKind::Markers(markers) => {
-            markers.own.is_empty() && markers.observations.iter().all(|o| o.shape.is_none())
+            markers.own.is_empty()
+                && markers.sight.is_none()
+                && markers.observations.iter().all(|o| o.shape.is_none())
         }
         _ => false,
     }

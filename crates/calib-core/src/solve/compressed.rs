@@ -276,6 +276,7 @@ impl Pass<'_> {
                 }
                 let item = model.observations[o].item;
                 if let Some(markers) = markers
+                    && markers.sight.is_none()
                     && markers.observations[item].shape.is_none()
                 {
                     // e = R p + t − y,   cost = w |e|² / σ²

@@ -183,6 +183,7 @@ fn all_heads(rig: &mut Rig, from: calib_core::FrameId, to: calib_core::FrameId, 
     add(
         "markers",
         MeasurementKind::Markers(measurement::Markers {
+            sight: None,
             own: std::collections::BTreeMap::new(),
             noise,
             observations: markers,
@@ -198,6 +199,7 @@ fn all_heads(rig: &mut Rig, from: calib_core::FrameId, to: calib_core::FrameId, 
     add(
         "poses",
         MeasurementKind::Poses(measurement::Poses {
+            sight: None,
             noise: split,
             observations,
         }),
@@ -288,6 +290,7 @@ fn a_block_that_occurs_twice_contributes_twice() {
         to: rig.base,
         path: Some(vec![(e0, false), (e1, false), (home, false), (e0, true)]),
         kind: MeasurementKind::Poses(measurement::Poses {
+            sight: None,
             noise: PoseNoise::Split {
                 orientation: noise,
                 position: noise,

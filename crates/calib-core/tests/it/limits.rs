@@ -260,6 +260,7 @@ fn what_cannot_be_stated_is_refused_by_name() {
         to: c,
         path: Some(vec![(e, false)]),
         kind: MeasurementKind::Poses(measurement::Poses {
+            sight: None,
             noise: PoseNoise::Split {
                 orientation: g,
                 position: g,

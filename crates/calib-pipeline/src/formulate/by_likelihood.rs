@@ -20,8 +20,8 @@ use crate::formulate::realign::realign;
 use crate::formulate::solved::Solved;
 use crate::formulate::stuck::{is_stuck, without_stuck};
 use crate::formulate::{
-    cameras, clock, computed, gain_or_scale, gear_ratio, noise, places, priors, row_levels, starts,
-    wanted, which_side,
+    along_sight, cameras, clock, computed, gain_or_scale, gear_ratio, noise, places, priors,
+    row_levels, starts, wanted, which_side,
 };
 use crate::prepare::inputs::Inputs;
 use crate::prepare::repeats::merge;
@@ -32,6 +32,8 @@ const ALIGNMENTS: usize = 3;
 /// Sides that joints came from are asked for at most this often: those of small effects show once the others are known, and those
 /// of held-out recordings last.
 const SIDES: usize = 3;
+/// Noise along the line of sight is stated again at most this often: how it grows shows once good rows of uncertain depth take part.
+const SIGHTS: usize = 2;
 /// Times that change by less, s, are right: at 1 m/s it is a hundredth of a millimeter.
 const ALIGNED: f64 = 1e-5;
 
@@ -63,7 +65,9 @@ pub fn likelihood(
     checked.findings.extend(place);
     let as_read = which_side::matters(inputs).then(|| (inputs.clone(), checked.tracks.clone()));
     let found = sided(inputs, checked, &how, progress)?;
-    let found = from_its_side(inputs, checked, (&how, as_read), found, progress)?;
+    let mut as_read = as_read;
+    let found = from_its_side(inputs, checked, (&how, &mut as_read), found, progress)?;
+    let found = along_its_sight(inputs, checked, (&how, as_read), found, progress)?;
     let (mut registered, mut fit, mut of_rows) =
         before_cameras(inputs, checked, &how, found, progress)?;
     for _ in 0..ALIGNMENTS {
@@ -85,6 +89,7 @@ pub fn likelihood(
         priors::by_evidence(&mut fit, inputs, &settings);
     }
     checked.findings.extend(noise::of_markers(&fit));
+    checked.findings.extend(along_sight::findings(inputs, &fit));
     let of_rows = row_levels::findings(inputs, &fit.formulation.samples);
     checked.findings.extend(of_rows);
     checked.findings.extend(noise::meaning(&mut fit));
@@ -151,7 +156,7 @@ type AsRead = (Inputs, BTreeMap<String, BodyTrack>);
 fn from_its_side(
     inputs: &mut Inputs,
     checked: &mut Checked,
-    (how, as_read): (&How<'_>, Option<AsRead>),
+    (how, as_read): (&How<'_>, &mut Option<AsRead>),
     found: Fits,
     progress: &mut dyn FnMut(&str),
 ) -> Result<Fits, PipelineError> {
@@ -160,10 +165,14 @@ fn from_its_side(
         return Ok(found);
     }
     // Rows are judged again with the noise of the other end.
-    let as_read = as_read.unwrap_or_else(|| (inputs.clone(), checked.tracks.clone()));
-    let inputs_of_found = std::mem::replace(inputs, as_read.0);
-    let tracks_of_found = std::mem::replace(&mut checked.tracks, as_read.1);
-    which_side::exchange(inputs, &mut checked.tracks, &told);
+    let read = || (inputs.clone(), checked.tracks.clone());
+    let (mut exchanged, mut tracks) = as_read.clone().unwrap_or_else(read);
+    which_side::exchange(&mut exchanged, &mut tracks, &told);
+    if as_read.is_some() {
+        *as_read = Some((exchanged.clone(), tracks.clone()));
+    }
+    let inputs_of_found = std::mem::replace(inputs, exchanged);
+    let tracks_of_found = std::mem::replace(&mut checked.tracks, tracks);
     progress("fit again with poses measured from their other end");
     // What was fitted without this does not depend on a fit with it.
     let again = sided(inputs, checked, how, progress).ok();
@@ -178,10 +187,54 @@ fn from_its_side(
             Ok(again)
         }
         None => {
+            if let Some((read, tracks)) = as_read {
+                which_side::exchange(read, tracks, &told);
+            }
             (*inputs, checked.tracks) = (inputs_of_found, tracks_of_found);
             Ok(found)
         }
     }
+}
+
+/// What was found, or again with noise of its own along the line of sight, where the recordings say so.
+fn along_its_sight(
+    inputs: &mut Inputs,
+    checked: &mut Checked,
+    (how, as_read): (&How<'_>, Option<AsRead>),
+    mut found: Fits,
+    progress: &mut dyn FnMut(&str),
+) -> Result<Fits, PipelineError> {
+    // The levels of a model that was chosen before lack these.
+    let how = How {
+        settings: how.settings,
+        near: None,
+    };
+    for _ in 0..SIGHTS {
+        let Some(told) = along_sight::told(inputs, &found.1) else {
+            break;
+        };
+        // Rows are judged again: with equal noise those of uncertain depth are gross errors.
+        let read = || (inputs.clone(), checked.tracks.clone());
+        let (mut read, tracks) = as_read.clone().unwrap_or_else(read);
+        read.sights = told;
+        let inputs_of_found = std::mem::replace(inputs, read);
+        let tracks_of_found = std::mem::replace(&mut checked.tracks, tracks);
+        progress("fit again with noise of its own along the line of sight");
+        // What was fitted without this does not depend on a fit with it.
+        let again = sided(inputs, checked, &how, progress).ok();
+        let better = |again: &Fits| {
+            let seen = (&*inputs, &checked.tracks);
+            along_sight::is_better(seen, &again.1, &found.1, how.settings)
+        };
+        match again.filter(better) {
+            Some(again) => found = again,
+            None => {
+                (*inputs, checked.tracks) = (inputs_of_found, tracks_of_found);
+                break;
+            }
+        }
+    }
+    Ok(found)
 }
 
 /// What was found with equal noise, or again with that of the profile's cameras where the recordings do not contradict it.

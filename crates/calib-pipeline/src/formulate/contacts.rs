@@ -279,6 +279,7 @@ fn touched(
             MeasurementKind::Markers(measurement::Markers {
                 noise,
                 own: BTreeMap::new(),
+                sight: None,
                 observations: at.map(seen).collect(),
             })
         }

@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use calib_core::{
-    EdgeId, FrameId, GroupId, NoiseChoice, NoiseKind, NoiseModel, ParameterId, PointId, Problem,
-    Solution, WidthEstimate,
+    EdgeId, FrameId, GroupId, MeasurementKind, NoiseChoice, NoiseKind, NoiseModel, ParameterId,
+    PointId, Problem, Solution, WidthEstimate,
 };
 use calib_profile::SharedWidth;
 
@@ -151,6 +151,17 @@ pub struct MlFit {
 }
 
 impl MlFit {
+    /// Whether something has noise of its own along the line of sight.
+    #[must_use]
+    pub fn has_sight(&self) -> bool {
+        let mut measurements = self.formulation.problem.measurements().iter();
+        measurements.any(|m| match &m.kind {
+            MeasurementKind::Markers(markers) => markers.sight.is_some(),
+            MeasurementKind::Poses(poses) => poses.sight.is_some(),
+            _ => false,
+        })
+    }
+
     /// Noise of the reading of a joint that turns, rms over the joints that have any, rad; `None` where none has.
     #[must_use]
     pub fn joint_sigma(&self) -> Option<f64> {

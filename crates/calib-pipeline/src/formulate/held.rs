@@ -122,7 +122,7 @@ fn held(inputs: &Inputs, loaded: &Loaded) -> Option<Held> {
     if !moving.iter().all(has_column) {
         return None;
     }
-    let sigma = inputs.robot.profile.tracker.marker_sigma;
+    let sigma = inputs.robot.profile.tracker.marker_coordinate();
     let at_rest = AT_REST_SIGMAS * sigma.unwrap_or(Options::default().sigma);
     let largest = |bodies: &[(&String, &Body)], a: usize, b: usize| {
         let moved = bodies.iter().filter_map(|of| displaced(loaded, *of, a, b));

@@ -1,5 +1,6 @@
 //! The profile and the recordings as one likelihood problem.
 
+pub mod along_sight;
 pub mod bad_rows;
 mod body_error;
 pub mod by_closed_forms;

@@ -13,6 +13,7 @@ use nalgebra::UnitVector3;
 
 use crate::formulate::formulation::MlFit;
 use crate::formulate::kinematics::motion_axis;
+use crate::formulate::ml;
 use crate::formulate::row_levels::{HeldOutLevels, row_levels};
 use crate::output::counts::{Tracks, rejected_parts, rejected_share};
 use crate::output::evidence::{Evidence, fit_end};
@@ -240,7 +241,9 @@ fn goodness(e: &Evidence<'_>, fit: &MlFit) -> Goodness {
         n.estimated && n.samples >= ENOUGH && n.kind == NoiseKind::Position && stated.is_none()
     });
     let above = unstated.filter_map(|n| {
-        let of_markers = n.name == "marker" || n.name.starts_with("marker ");
+        // The scatter is that of all directions: along one of them there is more by right.
+        let of_markers = (n.name == "marker" || n.name.starts_with("marker "))
+            && !n.name.starts_with(ml::MARKER_ALONG_SIGHT);
         let rigid = rigid_of(&n.name).filter(|rigid| of_markers && *rigid > 0.0)?;
         Some((n.name.clone(), n.sigma / rigid))
     });

@@ -12,6 +12,7 @@ use calib_report::{
 
 use crate::formulate::formulation::MlFit;
 use crate::formulate::found::Found;
+use crate::formulate::ml;
 use crate::output::evidence::{Evidence, fit_end};
 
 pub(crate) fn transform(found: &Found) -> Transform {
@@ -177,7 +178,12 @@ pub(crate) fn stated_sigma(profile: &Profile, group: &str) -> Option<f64> {
             .strip_prefix(of)
             .is_some_and(|rest| rest.is_empty() || rest.starts_with(' '))
     };
+    let sight = profile.tracker.sight;
     match group {
+        // What is stated of all directions alike says nothing of depth.
+        _ if of(ml::MARKER_ALONG_SIGHT) => sight.marker,
+        _ if of(ml::BODY_ALONG_SIGHT) => sight.body,
+        _ if of(ml::BODY_ABOUT_SIGHT) => sight.body_rad,
         _ if of("marker") => profile.tracker.marker_sigma,
         _ if of("body position") => profile.tracker.body_sigma,
         _ if of("body orientation") => profile.tracker.body_sigma_rad,

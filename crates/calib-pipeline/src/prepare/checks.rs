@@ -272,6 +272,6 @@ fn expectations(inputs: &Inputs, loaded: &Loaded) -> Expectations {
             .collect(),
         reach: None,
         min_poses: fewest_poses(inputs, loaded),
-        marker_sigma: profile.tracker.marker_sigma,
+        marker_sigma: profile.tracker.marker_coordinate(),
     }
 }

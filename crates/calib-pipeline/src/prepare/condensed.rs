@@ -168,7 +168,7 @@ fn condense_body(
     let gathered = gather(names, &fitted);
     let distances = Distances::of(
         &slices(&gathered),
-        inputs.robot.profile.tracker.marker_sigma,
+        inputs.robot.profile.tracker.marker_coordinate(),
     );
     let given = template.map(|points| Template::given(names.to_vec(), points.to_vec()));
     let given = given.transpose().ok()?;

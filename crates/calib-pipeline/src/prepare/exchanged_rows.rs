@@ -46,7 +46,7 @@ type Place = (usize, usize);
 
 /// Puts the labels of bodies right in rows where they are exchanged; one finding for each exchange and recording.
 pub(super) fn in_rows(inputs: &mut Inputs) -> Vec<Finding> {
-    let stated = inputs.robot.profile.tracker.marker_sigma;
+    let stated = inputs.robot.profile.tracker.marker_coordinate();
     let bodies = inputs.robot.profile.bodies.iter();
     let bodies: Vec<Named<'_>> = bodies
         .filter_map(|(name, body)| match &body.kind {

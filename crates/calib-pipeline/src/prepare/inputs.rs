@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use calib_core::measurement::Growth;
 use calib_finding::Finding;
 use calib_profile::{BodyKind, Profile, RecordingSpec};
 use calib_recording::{Meta, Poses};
@@ -103,6 +104,23 @@ pub(crate) fn range<'a>(
         })
 }
 
+/// Bodies whose noise along the line of sight has levels of its own, and how these grow.
+pub type Sights = BTreeMap<String, Growth>;
+
+/// Bodies for which the profile states the noise along the line of sight.
+pub(crate) fn stated_sights(profile: &Profile) -> Sights {
+    let sight = profile.tracker.sight;
+    let is_stated = |kind: &BodyKind| match kind {
+        BodyKind::Pose => sight.body.is_some() || sight.body_rad.is_some(),
+        BodyKind::Markers { .. } => sight.marker.is_some(),
+    };
+    let bodies = profile.bodies.iter();
+    let stated = bodies.filter(|(_, body)| is_stated(&body.kind));
+    stated
+        .map(|(name, _)| (name.clone(), Growth::default()))
+        .collect()
+}
+
 /// Everything the estimation needs.
 #[derive(Debug, Clone)]
 pub struct Inputs {
@@ -118,6 +136,8 @@ pub struct Inputs {
     pub taken_out: BTreeSet<(String, usize, String)>,
     /// Bodies of very many markers, for which a few points stand: scatter of a marker coordinate about the rigid body, m, where it can be told.
     pub condensed: BTreeMap<String, Option<f64>>,
+    /// Bodies with noise of its own along the line of sight, as the profile states or the fit found.
+    pub sights: Sights,
     /// Digests of all files read, profile first.
     pub digests: Vec<Digest>,
     /// Estimators, readers and writers that the profile can name.

@@ -21,7 +21,7 @@ pub(crate) fn position_sigma<'a>(
     let (sum, count) = levers.fold((0.0, 0.0), |(sum, n), lever| (sum + lever, n + 1.0));
     let lever = if count > 0.0 { sum / count } else { 0.0 };
     let of_angles = 2.0 / 3.0 * lever * tracker.body_sigma_rad.unwrap_or(0.0).powi(2);
-    let sigma = tracker.body_sigma?;
+    let sigma = tracker.body_coordinate()?;
     Some((sigma * sigma + of_angles).sqrt())
 }
 

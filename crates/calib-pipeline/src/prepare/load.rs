@@ -13,6 +13,7 @@ use crate::error::{DataProblem, NamedBy, PipelineError, WhyUnread};
 use crate::options::Plugins;
 use crate::prepare::align::align;
 use crate::prepare::estimators::{Estimators, values};
+use crate::prepare::inputs::stated_sights;
 use crate::prepare::robot::urdf_warnings;
 use crate::prepare::rows::prepare;
 use crate::prepare::timelines::{with_robot_log, with_robot_rows};
@@ -94,6 +95,7 @@ pub fn load_recordings_with(
         recordings.insert(name.clone(), loaded);
     }
     let mut inputs = Inputs {
+        sights: stated_sights(&robot.profile),
         robot,
         recordings,
         findings,
@@ -202,6 +204,7 @@ pub fn of_tables(
         excluded: Vec::new(),
         taken_out: BTreeSet::new(),
         condensed: BTreeMap::new(),
+        sights: stated_sights(&robot.profile),
         digests: robot.digests.clone(),
         robot,
         recordings,

@@ -38,7 +38,7 @@ pub fn relabel(inputs: &mut Inputs) -> Vec<Finding> {
             _ => None,
         })
         .collect();
-    let stated = inputs.robot.profile.tracker.marker_sigma;
+    let stated = inputs.robot.profile.tracker.marker_coordinate();
     // The distances of a body whose labels are another's say nothing of its rows.
     let mut findings = between_bodies(inputs);
     findings.extend(in_rows(inputs));

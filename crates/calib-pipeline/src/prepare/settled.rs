@@ -41,7 +41,7 @@ pub(crate) fn settle(
     let usual = HoldSettings::default();
     // Within a window of some twenty samples noise spreads over less than twelve σ.
     let spread = |sigma: Option<f64>| sigma.map_or(0.0, |s| 12.0 * s);
-    let position = spread(tracker.marker_sigma).max(spread(tracker.body_sigma));
+    let position = spread(tracker.marker_coordinate()).max(spread(tracker.body_coordinate()));
     let settings = HoldSettings {
         min_duration: timing.hold,
         point_range: usual.point_range.max(position),

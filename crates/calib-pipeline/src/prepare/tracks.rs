@@ -280,7 +280,7 @@ fn body_track(
         } => Some(Template::given(names.clone(), points.clone()).map_err(fail)?),
         _ => None,
     };
-    let stated = inputs.robot.profile.tracker.marker_sigma;
+    let stated = inputs.robot.profile.tracker.marker_coordinate();
     let gathered = gather(names, &fitted);
     let distances = Distances::of(&slices(&gathered), stated);
     // A sample that is off its body would turn the body's frame in all rows.

@@ -10,6 +10,7 @@ use calib_report::{AccuracyLimit, ErrorSource, HeldOut, PoseError, Workspace, Wo
 use calib_urdf::LinkId;
 use nalgebra::Matrix6;
 
+use crate::formulate::along_sight::orientation;
 use crate::formulate::formulation::MlFit;
 use crate::formulate::kinematics::joint_state;
 use crate::prepare::conditions::Conditions;
@@ -290,7 +291,8 @@ impl ToolBody<'_> {
         if *self.kind == BodyKind::Pose || track.is_computed {
             let mut noise = fit.solution.noise.iter();
             let found = noise.find(|n| n.kind == NoiseKind::Orientation)?;
-            let variance = level(NoiseKind::Orientation, found.sigma.powi(2));
+            let found = orientation(fit, self.name).unwrap_or(found.sigma.powi(2));
+            let variance = level(NoiseKind::Orientation, found);
             return Some((3.0 * variance).sqrt());
         }
         // Fit of a pose to n markers: information Σ J_iᵀJ_i/σ_i² with J_i = [−[p_i]ₓ, 1], and the part of the rotation.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use calib_core::{FrameId, GroupId, MeasurementKind, NoiseEstimate, NoiseKind, PointId, PoseNoise};
 use calib_report::{HeldOut, PoseError};
 
+use crate::formulate::along_sight::coordinate;
 use crate::formulate::formulation::MlFit;
 use crate::formulate::ml::MARKER_SIGMA;
 use crate::formulate::row_levels::HeldOutLevels;
@@ -25,6 +26,17 @@ pub(crate) struct TrackerNoise<'a> {
     samples: &'a [(String, usize)],
 }
 
+/// What a level of noise is of.
+#[derive(Debug, Clone, Copy)]
+enum Of {
+    /// Markers, in all directions or across the line of sight.
+    Marker,
+    /// Markers along the line of sight.
+    MarkerAlong,
+    /// Bodies whose poses are measured.
+    Pose,
+}
+
 impl<'a> TrackerNoise<'a> {
     /// Of a fit, as it found it.
     pub(crate) fn of(fit: &'a MlFit) -> Self {
@@ -40,7 +52,7 @@ impl<'a> TrackerNoise<'a> {
         tracks: &BTreeMap<String, BodyTrack>,
         lacking: bool,
     ) -> Self {
-        let stated = inputs.robot.profile.tracker.marker_sigma;
+        let stated = inputs.robot.profile.tracker.marker_coordinate();
         let scatter = tracks.values().filter_map(|track| track.marker_sigma);
         let scatter = scatter.reduce(f64::max);
         // In units of the level that the fit began with.
@@ -51,9 +63,14 @@ impl<'a> TrackerNoise<'a> {
         };
         let of_poses = lacking.then_some(1.0);
         let above = if lacking { 1.0 } else { CLEARLY };
-        Self::with(fit, &|of_marker, found| {
-            let most = if of_marker { of_markers } else { of_poses };
-            let most = most.map_or(f64::INFINITY, |times| times * found.stated);
+        Self::with(fit, &|of, found| {
+            let times = match of {
+                Of::Marker => of_markers,
+                // All of the scatter may lie along one of three directions.
+                Of::MarkerAlong => of_markers.map(|times| times * f64::sqrt(3.0)),
+                Of::Pose => of_poses,
+            };
+            let most = times.map_or(f64::INFINITY, |times| times * found.stated);
             if found.sigma > above * most {
                 most
             } else {
@@ -63,10 +80,10 @@ impl<'a> TrackerNoise<'a> {
     }
 
     /// With levels, m, of markers or else of poses, from those that were found.
-    fn with(fit: &'a MlFit, of_level: &dyn Fn(bool, &NoiseEstimate) -> f64) -> Self {
-        let level = |group: GroupId, of_marker: bool| {
+    fn with(fit: &'a MlFit, of_level: &dyn Fn(Of, &NoiseEstimate) -> f64) -> Self {
+        let level = |group: GroupId, of: Of| {
             let found = fit.solution.noise.iter().find(|n| n.id == group)?;
-            Some(of_level(of_marker, found).powi(2))
+            Some(of_level(of, found).powi(2))
         };
         let (markers, bodies) = (markers(fit), bodies(fit));
         let mut by_subject = BTreeMap::new();
@@ -86,24 +103,45 @@ impl<'a> TrackerNoise<'a> {
                     }
                     for (point, (sum, count)) in shapes {
                         let name = markers.get(&point).copied();
-                        let variance = level(seen.noise_of(point), true);
-                        by_subject.extend(name.zip(variance.map(|v| v * sum / count)));
+                        let of_point = seen.observations.iter().filter(|o| o.point == point);
+                        let distances = of_point.map(|o| o.position.coords.norm());
+                        let variance = level(seen.noise_of(point), Of::Marker);
+                        let variance = match &seen.sight {
+                            None => variance.map(|v| v * sum / count),
+                            Some(sight) => {
+                                (variance.zip(level(sight.along, Of::MarkerAlong))).map(|levels| {
+                                    coordinate(levels, sight.growth.positions, distances)
+                                })
+                            }
+                        };
+                        by_subject.extend(name.zip(variance));
                     }
                 }
                 MeasurementKind::Poses(seen) => {
                     if let PoseNoise::Split { position, .. } = seen.noise {
                         let name = bodies.get(&measurement.to).copied();
-                        by_subject.extend(name.zip(level(position, false)));
+                        let across = level(position, Of::Pose);
+                        let distances = seen.observations.iter();
+                        let distances = distances.map(|o| o.pose.translation.vector.norm());
+                        let variance = match &seen.sight {
+                            None => across,
+                            Some(sight) => {
+                                (across.zip(level(sight.along, Of::Pose))).map(|levels| {
+                                    coordinate(levels, sight.growth.positions, distances)
+                                })
+                            }
+                        };
+                        by_subject.extend(name.zip(variance));
                     }
                 }
                 _ => {}
             }
         }
         let groups = fit.formulation.noise;
-        let common = groups.marker.and_then(|g| level(g, true));
+        let common = groups.marker.and_then(|g| level(g, Of::Marker));
         Self {
             by_subject,
-            common: common.or_else(|| level(groups.body_position?, false)),
+            common: common.or_else(|| level(groups.body_position?, Of::Pose)),
             samples: &fit.formulation.samples,
         }
     }

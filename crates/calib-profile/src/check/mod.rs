@@ -8,7 +8,7 @@ use nalgebra::{Isometry3, Point3, Translation3, Unit, Vector3};
 
 use crate::error::{Problem, ProfileError, escaped, expected, one_of};
 use crate::locate::{Place, Places};
-use crate::profile::{FromRoot, Outputs, Profile, Tracker};
+use crate::profile::{FromRoot, Outputs, Profile, SightSigma, Tracker};
 use crate::raw::{RawFree, RawFromRoot, RawPose, RawProfile};
 use crate::slip;
 use crate::units::{DEG, MM, split_joint_key};
@@ -156,6 +156,9 @@ impl<'a> Checker<'a> {
             ("marker_sigma_mm", raw.tracker.marker_sigma_mm),
             ("body_sigma_mm", raw.tracker.body_sigma_mm),
             ("body_sigma_deg", raw.tracker.body_sigma_deg),
+            ("marker_sight_sigma_mm", raw.tracker.marker_sight_sigma_mm),
+            ("body_sight_sigma_mm", raw.tracker.body_sight_sigma_mm),
+            ("body_sight_sigma_deg", raw.tracker.body_sight_sigma_deg),
         ] {
             if let Some(value) = value {
                 self.positive(&["tracker", key], value);
@@ -173,6 +176,11 @@ impl<'a> Checker<'a> {
                 marker_sigma: raw.tracker.marker_sigma_mm.map(|s| s * MM),
                 body_sigma: raw.tracker.body_sigma_mm.map(|s| s * MM),
                 body_sigma_rad: raw.tracker.body_sigma_deg.map(|s| s * DEG),
+                sight: SightSigma {
+                    marker: raw.tracker.marker_sight_sigma_mm.map(|s| s * MM),
+                    body: raw.tracker.body_sight_sigma_mm.map(|s| s * MM),
+                    body_rad: raw.tracker.body_sight_sigma_deg.map(|s| s * DEG),
+                },
                 up_axis: raw.tracker.up_axis,
                 from_root: raw
                     .tracker

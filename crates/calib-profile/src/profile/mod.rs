@@ -86,10 +86,46 @@ pub struct Tracker {
     pub body_sigma: Option<f64>,
     /// A body's orientation about each axis, rad.
     pub body_sigma_rad: Option<f64>,
+    /// One along the line of sight, where it is stated apart from those across it.
+    pub sight: SightSigma,
     /// Axis of the tracker's frame along which the robot's root has its z, where it was said.
     pub up_axis: Option<UpAxis>,
     /// Measured pose of the robot's root.
     pub from_root: Option<FromRoot>,
+}
+
+/// What is stated of the noise along the line of sight (standard deviations).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SightSigma {
+    /// A marker, m.
+    pub marker: Option<f64>,
+    /// A body's position, m.
+    pub body: Option<f64>,
+    /// A body's rotation about the line of sight, rad.
+    pub body_rad: Option<f64>,
+}
+
+impl Tracker {
+    /// rms over the directions of the σ of a marker's coordinate, m, where it is stated.
+    #[must_use]
+    pub fn marker_coordinate(&self) -> Option<f64> {
+        rms(self.marker_sigma, self.sight.marker)
+    }
+
+    /// rms over the directions of the σ of a coordinate of a body's position, m, where it is stated.
+    #[must_use]
+    pub fn body_coordinate(&self) -> Option<f64> {
+        rms(self.body_sigma, self.sight.body)
+    }
+}
+
+/// Of two directions across the line of sight and one along it.
+fn rms(across: Option<f64>, along: Option<f64>) -> Option<f64> {
+    let across = across?;
+    let along = along.filter(|along| *along != across);
+    Some(along.map_or(across, |along| {
+        ((2.0 * across * across + along * along) / 3.0).sqrt()
+    }))
 }
 
 /// A measured `tracker_from_root`.

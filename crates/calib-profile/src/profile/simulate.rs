@@ -62,6 +62,12 @@ pub struct SimNoise {
     pub marker: f64,
     /// A body's pose.
     pub body: Error3,
+    /// A marker along the line of sight, m, where that differs.
+    pub marker_sight: Option<f64>,
+    /// A body's position along the line of sight, m, where that differs.
+    pub body_sight: Option<f64>,
+    /// A body's rotation about the line of sight, rad, where that differs.
+    pub body_sight_rad: Option<f64>,
     /// A joint, rad.
     pub joint: f64,
     /// Share of lost samples.

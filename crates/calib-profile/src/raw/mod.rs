@@ -122,6 +122,15 @@ pub struct RawTracker {
     /// Stated standard deviation of a body's orientation about each axis, deg.
     #[serde(default)]
     pub body_sigma_deg: Option<f64>,
+    /// Stated standard deviation of a marker along the line of sight, mm, of a tracker that knows depth less well; `marker_sigma_mm` is then that across it.
+    #[serde(default)]
+    pub marker_sight_sigma_mm: Option<f64>,
+    /// Stated standard deviation of a body's position along the line of sight, mm, as of a single camera; `body_sigma_mm` is then that across it.
+    #[serde(default)]
+    pub body_sight_sigma_mm: Option<f64>,
+    /// Stated standard deviation of a body's rotation about the line of sight, deg; `body_sigma_deg` is then that about the axes across it.
+    #[serde(default)]
+    pub body_sight_sigma_deg: Option<f64>,
     /// The axis of the tracker's world frame along which the robot's root frame has its z: `+Z` for a robot that stands
     /// upright before a tracker whose z is up. Only compared with what the recordings show, never assumed.
     #[serde(default)]

@@ -46,12 +46,12 @@ impl Unnumbered {
 /// W = σ V⁻¹ σ,   k = σ V⁻¹ J,   y = σ V⁻¹ e
 pub(super) fn scaled_sample(solution: &Solution, rows: &Whitened, of: MemoryOf) -> Unnumbered {
     let m = rows.w.len();
-    let mut sigma = vec![1.0; m];
+    let mut sigma = vec![0.0; m];
     let mut own = vec![None; m];
     for &(o, first, count) in &rows.blocks {
         add_block(&solution.model, o, |i, j, group, shape| {
             if i == j {
-                sigma[first + i] = (solution.theta[group] * shape).sqrt();
+                sigma[first + i] += solution.theta[group] * shape;
             }
         });
         let observation = solution.model.observations[o];
@@ -62,6 +62,16 @@ pub(super) fn scaled_sample(solution: &Solution, rows: &Whitened, of: MemoryOf) 
             }
             _ => 0,
         };
+        // Rows that are turned are in one unit.
+        if matches!(kind, MeasurementKind::Poses(poses) if poses.sight.is_some()) {
+            for three in sigma[first..first + 6].chunks_exact_mut(3) {
+                let mean = three.iter().sum::<f64>() / 3.0;
+                three.fill(mean);
+            }
+        }
+        for s in &mut sigma[first..first + count] {
+            *s = s.sqrt();
+        }
         for i in 0..count {
             if asked(of, kind, i) {
                 own[first + i] = Some((observation.measurement, part, i));
@@ -139,7 +149,9 @@ fn turn_of_rows(kind: &MeasurementKind, item: usize) -> Option<Matrix3<f64>> {
     match kind {
         MeasurementKind::Poses(poses) if matches!(poses.noise, PoseNoise::Split { .. }) => {
             let measured = &poses.observations[item].pose;
-            Some(measured.rotation.to_rotation_matrix().into_inner())
+            let turn = measured.rotation.to_rotation_matrix().into_inner();
+            let axes = kind.of().axes(item);
+            Some(axes.map_or(turn, |axes| turn * axes.transpose()))
         }
         _ => None,
     }

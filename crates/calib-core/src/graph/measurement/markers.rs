@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use nalgebra::{Matrix3, Point3};
 
-use super::{At, Input, Kind, Rows, isotropic};
+use super::{At, Input, Kind, Rows, Sight, isotropic};
 use crate::graph::error::Error;
 use crate::graph::ids::{GroupId, PointId};
 
@@ -15,6 +15,8 @@ pub struct Markers {
     pub noise: GroupId,
     /// σ per coordinate of markers that have one of their own.
     pub own: BTreeMap<PointId, GroupId>,
+    /// How the noise of what has no shape differs along the line of sight; `None` where it does not.
+    pub sight: Option<Sight>,
     /// What was seen.
     pub observations: Vec<MarkerObservation>,
 }
@@ -69,14 +71,27 @@ impl Kind for Markers {
         let p = (at.point)(o.point);
         // e = R p + t − y
         let e = at.place(&p) - o.position.coords;
-        Rows::place(o.point, &p, at.r, &e)
+        let rows = Rows::place(o.point, &p, at.r, &e);
+        match self.axes(item) {
+            Some(axes) => rows.in_axes(0, &axes),
+            None => rows,
+        }
+    }
+
+    fn axes(&self, item: usize) -> Option<Matrix3<f64>> {
+        let o = &self.observations[item];
+        let seen = self.sight.filter(|_| o.shape.is_none());
+        seen.map(|_| Sight::axes(&o.position.coords))
     }
 
     fn covariance(&self, item: usize, add: &mut dyn FnMut(usize, usize, GroupId, f64)) {
         let o = &self.observations[item];
         let noise = self.noise_of(o.point);
         let Some(shape) = &o.shape else {
-            return isotropic(0..3, noise, add);
+            return match &self.sight {
+                Some(sight) => sight.positions((0, noise), &o.position.coords, add),
+                None => isotropic(0..3, noise, add),
+            };
         };
         for i in 0..3 {
             for j in 0..=i {

@@ -22,6 +22,8 @@
 
 use std::collections::BTreeSet;
 
+use nalgebra::{Matrix3, Vector3};
+
 use crate::graph::error::Error;
 use crate::graph::ids::{EdgeId, FrameId, GroupId, PointId};
 
@@ -35,6 +37,7 @@ mod markers;
 mod plane;
 mod poses;
 mod rows;
+mod sight;
 
 pub use closed::Loop;
 pub use cylinder::Cylinder;
@@ -46,6 +49,7 @@ pub use markers::{MarkerObservation, Markers};
 pub use plane::Plane;
 pub use poses::{PoseNoise, PoseObservation, Poses};
 pub(crate) use rows::{At, Rows};
+pub use sight::{Growth, Sight, error_of_sight, growth};
 
 /// One kind of measurement along one path.
 #[derive(Debug, Clone, PartialEq)]
@@ -107,6 +111,11 @@ pub(crate) trait Kind {
     /// Calls `add(i, j ≤ i, group, shape_ij)` for every entry of an observation's own covariance `σ_group² shape`.
     fn covariance(&self, item: usize, add: &mut dyn FnMut(usize, usize, GroupId, f64));
 
+    /// B of the rows `B e` of an observation, each three of them, from the axes in which equations (1) to (8) state them; `None` where they are in these.
+    fn axes(&self, _item: usize) -> Option<Matrix3<f64>> {
+        None
+    }
+
     /// A residual split into what is an angle and what is a length.
     fn deviation(&self, e: &[f64]) -> Deviation {
         Deviation {
@@ -138,6 +147,17 @@ impl MeasurementKind {
             Self::Distance(kind) => kind,
             Self::Loop(kind) => kind,
             Self::Cylinder(kind) => kind,
+        }
+    }
+}
+
+impl MeasurementKind {
+    /// Three rows of an observation's residual in the axes in which equations (1) to (8) state them.
+    pub(crate) fn stated(&self, item: usize, rows: &[f64]) -> Vector3<f64> {
+        let three = Vector3::new(rows[0], rows[1], rows[2]);
+        match self.of().axes(item) {
+            Some(axes) => axes.tr_mul(&three),
+            None => three,
         }
     }
 }

@@ -3,9 +3,9 @@
 //! A camera on the robot states where a board beside it is, `to_from_from`. The errors of its angles are those of the board's angles, not of a
 //! lever from the board to the camera, so that the residual is formed there: `e = [Log(R_zᵀ R); −Rᵀt + R_zᵀt_z]`.
 
-use nalgebra::{Isometry3, Matrix6};
+use nalgebra::{Isometry3, Matrix3, Matrix6, Vector3};
 
-use super::{At, Deviation, Input, Kind, Rows, isotropic, norm};
+use super::{At, Deviation, Input, Kind, Rows, Sight, isotropic, norm};
 use crate::graph::error::Error;
 use crate::graph::ids::GroupId;
 
@@ -14,6 +14,8 @@ use crate::graph::ids::GroupId;
 pub struct Poses {
     /// How their noise is described.
     pub noise: PoseNoise,
+    /// How it differs along the line of sight; `None` where it does not, and of a full covariance.
+    pub sight: Option<Sight>,
     /// What was seen.
     pub observations: Vec<PoseObservation>,
 }
@@ -27,6 +29,16 @@ pub struct PoseObservation {
     pub pose: Isometry3<f64>,
     /// The inverse was measured: noise, residual and deviation are those of `to_from_from`.
     pub inverse: bool,
+}
+
+impl PoseObservation {
+    /// R_zᵀ t_z: from the instrument to what it saw, in axes of the rows, m, whichever end the instrument is at.
+    #[must_use]
+    pub fn line_of_sight(&self) -> Vector3<f64> {
+        self.pose
+            .rotation
+            .inverse_transform_vector(&self.pose.translation.vector)
+    }
 }
 
 /// Noise of a measured pose.
@@ -108,26 +120,46 @@ impl Kind for Poses {
     fn residual(&self, item: usize, at: &At<'_>) -> Rows {
         let PoseObservation { pose, inverse, .. } = &self.observations[item];
         let r_z = pose.rotation.to_rotation_matrix();
-        match inverse {
+        let rows = match inverse {
             false => Rows::pose(r_z.matrix(), &pose.translation.vector, at),
             true => Rows::inverse_pose(r_z.matrix(), &pose.translation.vector, at),
+        };
+        match self.axes(item) {
+            Some(axes) => rows.in_axes(0, &axes).in_axes(3, &axes),
+            None => rows,
         }
     }
 
-    fn covariance(&self, _item: usize, add: &mut dyn FnMut(usize, usize, GroupId, f64)) {
+    fn covariance(&self, item: usize, add: &mut dyn FnMut(usize, usize, GroupId, f64)) {
+        if let Some(sight) = &self.sight
+            && let PoseNoise::Split {
+                orientation,
+                position,
+            } = self.noise
+        {
+            let seen = self.observations[item].line_of_sight();
+            sight.orientations((0, orientation), &seen, add);
+            sight.positions((3, position), &seen, add);
+            return;
+        }
         self.noise.covariance(add);
     }
 
     fn deviation(&self, e: &[f64]) -> Deviation {
         deviation(e)
     }
+
+    fn axes(&self, item: usize) -> Option<Matrix3<f64>> {
+        let split = matches!(self.noise, PoseNoise::Split { .. });
+        let seen = self.sight.filter(|_| split);
+        seen.map(|_| Sight::axes(&self.observations[item].line_of_sight()))
+    }
 }
 
 #[cfg(test)]
 mod tests {
-    use nalgebra::Vector3;
-
     use super::*;
+    use crate::graph::measurement::Growth;
     use crate::graph::measurement::tests::assert_jacobian;
 
     #[test]
@@ -138,15 +170,23 @@ mod tests {
                 orientation: GroupId::of(0),
                 position: GroupId::of(1),
             };
-            let observations = vec![PoseObservation {
-                sample: 0,
-                pose,
-                inverse,
-            }];
-            assert_jacobian(&Poses {
-                noise,
-                observations,
-            });
+            let sight = Sight {
+                along: GroupId::of(2),
+                about: Some(GroupId::of(3)),
+                growth: Growth::default(),
+            };
+            for sight in [None, Some(sight)] {
+                let observations = vec![PoseObservation {
+                    sample: 0,
+                    pose,
+                    inverse,
+                }];
+                assert_jacobian(&Poses {
+                    noise,
+                    sight,
+                    observations,
+                });
+            }
         }
     }
 }

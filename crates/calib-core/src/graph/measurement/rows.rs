@@ -128,6 +128,25 @@ impl Rows {
         out
     }
 
+    /// Three rows from `first` on, in other axes.
+    pub(crate) fn in_axes(mut self, first: usize, axes: &Matrix3<f64>) -> Self {
+        let (e, m, point) = (self.e, self.m, self.point);
+        for i in 0..3 {
+            let part =
+                |of: &dyn Fn(usize) -> f64| (0..3).map(|c| axes[(i, c)] * of(first + c)).sum();
+            self.e[first + i] = part(&|row| e[row]);
+            for x in 0..6 {
+                self.m[first + i][x] = part(&|row| m[row][x]);
+            }
+            if let (Some((_, by_point)), Some((_, before))) = (&mut self.point, &point) {
+                for x in 0..3 {
+                    by_point[first + i][x] = part(&|row| before[row][x]);
+                }
+            }
+        }
+        self
+    }
+
     /// Three rows of Log(R_zᵀR).
     fn rotation(relative: &Matrix3<f64>) -> Self {
         let mut out = Self::zeros();

@@ -8,7 +8,7 @@ use nalgebra::Point3;
 use crate::graph::ids::{EdgeId, FrameId, GroupId, PointId};
 use crate::graph::measurement::{
     Loop, MarkerObservation, Markers, Measurement, MeasurementKind, PoseNoise, PoseObservation,
-    Poses,
+    Poses, Sight,
 };
 use crate::graph::parameter::{Parameter, ParameterKind};
 use crate::graph::problem::{Point, Problem};
@@ -79,6 +79,7 @@ impl Problem {
             kind: MeasurementKind::Markers(Markers {
                 noise,
                 own: BTreeMap::new(),
+                sight: None,
                 observations,
             }),
         });
@@ -100,9 +101,19 @@ impl Problem {
             path: None,
             kind: MeasurementKind::Poses(Poses {
                 noise,
+                sight: None,
                 observations,
             }),
         });
+    }
+
+    /// Gives the noise of the measurement that was added last another level along the line of sight, where it is of poses or markers.
+    pub fn noise_along_sight(&mut self, sight: Sight) {
+        match self.measurements_mut().last_mut().map(|m| &mut m.kind) {
+            Some(MeasurementKind::Markers(markers)) => markers.sight = Some(sight),
+            Some(MeasurementKind::Poses(poses)) => poses.sight = Some(sight),
+            _ => {}
+        }
     }
 
     /// Two paths between the same frames that must agree at `samples`: out along `there`, home

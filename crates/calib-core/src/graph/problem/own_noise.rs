@@ -136,15 +136,23 @@ struct BodyLevel {
 
 /// Noise levels of what is seen of a body.
 fn levels_of(kind: &mut MeasurementKind) -> Vec<&mut GroupId> {
-    match kind {
-        MeasurementKind::Markers(markers) => vec![&mut markers.noise],
-        MeasurementKind::Poses(poses) => match &mut poses.noise {
-            PoseNoise::Split {
-                orientation,
-                position,
-            } => vec![orientation, position],
-            PoseNoise::Full { scale, .. } => vec![scale],
-        },
-        _ => Vec::new(),
+    let (mut levels, sight) = match kind {
+        MeasurementKind::Markers(markers) => (vec![&mut markers.noise], &mut markers.sight),
+        MeasurementKind::Poses(poses) => {
+            let levels = match &mut poses.noise {
+                PoseNoise::Split {
+                    orientation,
+                    position,
+                } => vec![orientation, position],
+                PoseNoise::Full { scale, .. } => vec![scale],
+            };
+            (levels, &mut poses.sight)
+        }
+        _ => return Vec::new(),
+    };
+    if let Some(sight) = sight {
+        levels.push(&mut sight.along);
+        levels.extend(&mut sight.about);
     }
+    levels
 }

@@ -4,6 +4,7 @@ mod parts;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Point3, Vector3};
 
+use crate::graph::measurement::{Growth, Sight};
 use crate::model::layout::Model;
 use crate::model::values::Values;
 use crate::solve::components::{Sums, sums};
@@ -71,7 +72,47 @@ fn problem(markers: usize) -> Problem {
         })
         .collect();
     p.poses("arm", base, b, noise, poses);
+    along_sight(&mut p, (base, c), points[0], noise);
     p
+}
+
+/// A pose and a marker with levels of their own along the line of sight, of which those of positions grow.
+fn along_sight(p: &mut Problem, (from, to): (FrameId, FrameId), known: PointId, noise: PoseNoise) {
+    let along = p.noise_group("along", NoiseKind::Position, 5e-3, true);
+    let about = p.noise_group("about", NoiseKind::Orientation, 1e-3, true);
+    let mut sight = Sight {
+        along,
+        about: Some(about),
+        growth: Growth {
+            positions: Some(0.7),
+            orientations: None,
+        },
+    };
+    let at = |sample: usize| Vector3::new(0.3, (sample as f64).cos(), 1.0);
+    let poses = (0..p.samples())
+        .map(|sample| PoseObservation {
+            sample,
+            pose: Isometry3::new(at(sample), Vector3::new(0.1, 0.0, (sample as f64).sin())),
+            inverse: sample % 2 == 1,
+        })
+        .collect();
+    p.poses("camera", from, to, noise, poses);
+    p.noise_along_sight(sight);
+    let PoseNoise::Split { position, .. } = noise else {
+        return;
+    };
+    sight.about = None;
+    let seen = (0..p.samples())
+        .map(|sample| MarkerObservation {
+            sample,
+            point: known,
+            position: at(sample).into(),
+            shape: None,
+        })
+        .collect();
+    let of_known = p.points()[known.index()].frame;
+    p.markers("depth", from, of_known, position, seen);
+    p.noise_along_sight(sight);
 }
 
 /// A model at its start, with the noise that was stated; every observation of its own weight.

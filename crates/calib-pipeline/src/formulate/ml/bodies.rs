@@ -4,7 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use calib_core::{
     Chart, FrameId, GroupId, MarkerObservation, NoiseKind, PointId, PoseNoise, PoseObservation,
-    Problem, Role,
+    Problem, Role, measurement::Sight,
 };
 use calib_profile::{BodyKind, Profile};
 use nalgebra::{Isometry3, Point3};
@@ -22,6 +22,12 @@ pub(crate) const MARKER_SIGMA: f64 = 0.5e-3;
 const BODY_SIGMA: f64 = 0.5e-3;
 /// Body orientation noise that estimation starts from, rad (0.2°).
 const BODY_SIGMA_RAD: f64 = 3.5e-3;
+/// Name of the noise of markers along the line of sight.
+pub(crate) const MARKER_ALONG_SIGHT: &str = "marker along sight";
+/// Name of the noise of bodies' positions along the line of sight.
+pub(crate) const BODY_ALONG_SIGHT: &str = "body position along sight";
+/// Name of the noise of bodies' rotations about the line of sight.
+pub(crate) const BODY_ABOUT_SIGHT: &str = "body orientation about sight";
 pub(super) fn add_bodies(
     formulation: &mut Formulation,
     inputs: &Inputs,
@@ -79,6 +85,9 @@ pub(super) fn add_bodies(
                 if only || !poses.is_empty() {
                     let (problem, tracker) = (&mut formulation.problem, formulation.tracker);
                     problem.poses(name, tracker, frame, *noise, poses);
+                    if let Some(sight) = level.sight(inputs, name, level.body_sight) {
+                        problem.noise_along_sight(sight);
+                    }
                 }
             }
         } else if let BodyKind::Markers { names, .. } = &body.kind {
@@ -109,6 +118,9 @@ pub(super) fn add_bodies(
                 if only || !markers.is_empty() {
                     let (problem, tracker) = (&mut formulation.problem, formulation.tracker);
                     problem.markers(name, tracker, frame, noise, markers);
+                    if let Some(sight) = level.sight(inputs, name, level.marker_sight) {
+                        problem.noise_along_sight(sight);
+                    }
                 }
             }
             let points = points.into_iter().collect();
@@ -125,6 +137,30 @@ struct Level {
     markers: Option<GroupId>,
     /// Of bodies, where the pose of some is seen.
     bodies: Option<PoseNoise>,
+    /// Of markers along the line of sight.
+    marker_sight: Option<AtSight>,
+    /// Of bodies along the line of sight and about it.
+    body_sight: Option<AtSight>,
+}
+
+/// Levels along the line of sight, and about it.
+#[derive(Clone, Copy)]
+struct AtSight {
+    along: GroupId,
+    about: Option<GroupId>,
+}
+
+impl Level {
+    /// These levels for a body that has them.
+    fn sight(&self, inputs: &Inputs, body: &str, of: Option<AtSight>) -> Option<Sight> {
+        let AtSight { along, about } = of?;
+        let growth = *inputs.sights.get(body)?;
+        Some(Sight {
+            along,
+            about,
+            growth,
+        })
+    }
 }
 
 fn levels(
@@ -136,10 +172,19 @@ fn levels(
     for of in row_levels(inputs, &formulation.samples) {
         let profile = &inputs.robot.profile;
         let (markers, bodies) = noise_groups(formulation, profile, as_pose, (&of.name, of.times));
+        let has_sight = |pose: bool| {
+            let mut names = inputs.sights.keys();
+            names.any(|name| as_pose(name) == pose)
+        };
+        let wanted = [has_sight(false), has_sight(true)];
+        let (marker_sight, body_sight) =
+            sight_groups(formulation, profile, wanted, (&of.name, of.times));
         levels.push(Level {
             recordings: of.recordings,
             markers,
             bodies,
+            marker_sight,
+            body_sight,
         });
     }
     // Of all that has no level of its own, the first tells.
@@ -236,6 +281,36 @@ fn noise_groups(
         ),
     });
     (marker_noise, body_noise)
+}
+
+/// The same along the line of sight, of markers and of bodies, where it is `wanted`.
+fn sight_groups(
+    formulation: &mut Formulation,
+    profile: &Profile,
+    [of_markers, of_bodies]: [bool; 2],
+    (of, times): (&str, f64),
+) -> (Option<AtSight>, Option<AtSight>) {
+    let known = profile.solve.noise.known;
+    let tracker = &profile.tracker;
+    let problem = &mut formulation.problem;
+    let mut group = |name: &str, kind: NoiseKind, sigma: f64| {
+        problem.noise_group(&format!("{name}{of}"), kind, times * sigma, !known)
+    };
+    let sigma = tracker.sight.marker.or(tracker.marker_sigma);
+    let sigma = sigma.unwrap_or(MARKER_SIGMA);
+    let markers = of_markers.then(|| AtSight {
+        along: group(MARKER_ALONG_SIGHT, NoiseKind::Position, sigma),
+        about: None,
+    });
+    let sigma = tracker.sight.body.or(tracker.body_sigma);
+    let sigma = sigma.unwrap_or(BODY_SIGMA);
+    let turn = tracker.sight.body_rad.or(tracker.body_sigma_rad);
+    let turn = turn.unwrap_or(BODY_SIGMA_RAD);
+    let bodies = of_bodies.then(|| AtSight {
+        along: group(BODY_ALONG_SIGHT, NoiseKind::Position, sigma),
+        about: Some(group(BODY_ABOUT_SIGHT, NoiseKind::Orientation, turn)),
+    });
+    (markers, bodies)
 }
 
 /// What is known of the places of a body's markers.

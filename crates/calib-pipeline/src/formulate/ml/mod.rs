@@ -26,7 +26,7 @@ mod masses;
 mod starts;
 mod widths;
 
-pub(crate) use bodies::MARKER_SIGMA;
+pub(crate) use bodies::{BODY_ABOUT_SIGHT, BODY_ALONG_SIGHT, MARKER_ALONG_SIGHT, MARKER_SIGMA};
 pub(crate) use calibration::calibration;
 pub use calibration::calibration_at;
 pub use joints::JOINT_SIGMA;

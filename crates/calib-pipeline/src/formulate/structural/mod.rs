@@ -95,7 +95,7 @@ pub fn structural(inputs: &Inputs, tracks: &BTreeMap<String, BodyTrack>) -> Stru
         of_fit: Vec::new(),
     };
     let mut options = Options::default();
-    if let Some(sigma) = inputs.robot.profile.tracker.marker_sigma {
+    if let Some(sigma) = inputs.robot.profile.tracker.marker_coordinate() {
         options.sigma = sigma;
     }
     // A profile that expects more of the drawing than is usual is believed.
