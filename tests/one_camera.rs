@@ -186,6 +186,21 @@ fn equal_noise_has_no_line_of_sight() {
     }
 }
 
+/// Of a board that is seen well but tilts are, the finding speaks of angles alone.
+#[test]
+fn a_tilt_that_is_known_less_well_is_named_as_such() {
+    let tilt = Sigma {
+        along: CAMERA.across,
+        ..CAMERA
+    };
+    for seed in 0..3 {
+        let report = judged(Seen::Board, tilt, false, 80 + seed);
+        let told = named(&report, "noise-along-sight").expect("named");
+        assert_eq!(told["facts"]["kind"], "tilt", "{told}");
+        assert_levels(&report, Seen::Board, tilt, seed);
+    }
+}
+
 /// What the profile states is compared with what is found, and needs no word.
 #[test]
 fn a_stated_noise_along_the_line_of_sight_is_the_tracker_s() {

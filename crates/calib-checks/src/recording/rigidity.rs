@@ -2,9 +2,12 @@
 //!
 //! Everything is read from the distances `d_ij` between markers, which no motion changes.
 
+mod depth;
 mod rows;
 mod template;
 mod two;
+
+use std::f64::consts::SQRT_2;
 
 use super::Expectations;
 use crate::rigid_body::Template;
@@ -160,14 +163,16 @@ impl<'a> Body<'a> {
         let quiet = sigmas[(sigmas.len() - 1) / 4];
         // A distance has the noise of two coordinates along the line between the markers.
         let sigma = match expected.marker_sigma {
-            Some(stated) => quiet.max(stated * std::f64::consts::SQRT_2),
+            Some(stated) => quiet.max(stated * SQRT_2),
             None => {
                 let rows = tracks.iter().map(|track| track.iter().flatten().count());
                 let rows = rows.min().unwrap_or(0).max(ROWS) as f64;
                 quiet * (1.0 + FEW_ROWS / rows)
             }
         };
-        let tolerance = (SIGMAS * sigma).max(SMALLEST_FAULT);
+        // Distances along the line of sight have the noise of depth, and any of them may come to lie there.
+        let of_depth = depth::sigma(&tracks, &pairs).map_or(0.0, |along| along * SQRT_2);
+        let tolerance = (SIGMAS * sigma.max(of_depth)).max(SMALLEST_FAULT);
         Some(Body {
             name,
             markers: markers.iter().map(String::as_str).collect(),

@@ -174,6 +174,9 @@ super::topic! {
         "same": Info,
             "The tracker knows depth less well than place: along the line of sight, from the origin of its frame, body `{body}` scatters by {along}, across it by {across} per coordinate. Left-out poses are likelier with these levels, and the fit weighs by them.",
             "If the tracker is a single camera, or has few on one side, state it: `tracker: {{body_sight_sigma_mm: …}}`, for markers `marker_sight_sigma_mm`. Otherwise compare a length along the line of sight with a known one: a wrong scale looks alike.";
+        "tilt": Info,
+            "The tracker knows the tilt of body `{body}` less well than its angle about the line of sight from the origin of the tracker's frame: {tilt} about the axes across the line, {about} about it. Left-out poses are likelier with these levels, and the fit weighs by them.",
+            "If the tracker is a single camera, state it: `tracker: {{body_sight_sigma_deg: …}}`. Otherwise no action is needed.";
         "growing": Info,
             "The tracker knows depth less well than place, and less the farther away: along the line of sight, from the origin of its frame, body `{body}` scatters by {along} at {distance}, across it by {across} per coordinate. The first grows with the square of the distance, the second with the distance. Left-out poses are likelier with these levels, and the fit weighs by them.",
             "If the tracker is a single camera, or has few on one side, state it: `tracker: {{body_sight_sigma_mm: …}}`, for markers `marker_sight_sigma_mm`. Otherwise compare a length along the line of sight with a known one: a wrong scale looks alike.";

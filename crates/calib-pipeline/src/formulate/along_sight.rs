@@ -101,7 +101,7 @@ pub fn is_better(
     }
     let known = |of: &OfSight<'_>| {
         let tracker = &inputs.robot.profile.tracker;
-        match of.is_pose {
+        match of.turns.is_some() {
             true => tracker.body_sigma,
             false => tracker
                 .marker_sigma
@@ -122,33 +122,40 @@ pub fn is_better(
     }
 }
 
+/// Depth that is known less well than place by less is none to speak of.
+const CLEARLY: f64 = 1.5;
+
 /// Levels of a body with noise of its own along the line of sight, m.
 struct OfSight<'a> {
     body: &'a str,
-    is_pose: bool,
     sight: Sight,
     across: f64,
     along: f64,
+    /// Of orientations about the axes across it and about it, rad.
+    turns: Option<[f64; 2]>,
 }
 
 fn of_sight(fit: &MlFit) -> Vec<OfSight<'_>> {
     let sigma = |group: GroupId| fit.solution.noise[group.index()].sigma;
     let measurements = fit.formulation.problem.measurements().iter();
     let of = measurements.filter_map(|measurement| {
-        let (is_pose, across, sight) = match &measurement.kind {
-            MeasurementKind::Markers(of) => (false, of.noise, of.sight?),
+        let (turns, across, sight) = match &measurement.kind {
+            MeasurementKind::Markers(of) => (None, of.noise, of.sight?),
             MeasurementKind::Poses(of) => match of.noise {
-                PoseNoise::Split { position, .. } => (true, position, of.sight?),
+                PoseNoise::Split {
+                    position,
+                    orientation,
+                } => (Some(orientation), position, of.sight?),
                 _ => return None,
             },
             _ => return None,
         };
         Some(OfSight {
             body: &measurement.name,
-            is_pose,
             sight,
             across: sigma(across),
             along: sigma(sight.along),
+            turns: turns.and_then(|tilt| Some([sigma(tilt), sigma(sight.about?)])),
         })
     });
     of.collect()
@@ -164,15 +171,22 @@ pub(crate) fn findings(inputs: &Inputs, fit: &MlFit) -> Vec<Finding> {
         if as_stated || said.iter().any(|(along, _)| *along == sight.along) {
             continue;
         }
-        let kind = match sight.growth.positions {
-            Some(_) => "growing",
-            None => "same",
+        let finding = |kind| {
+            Finding::of_kind(catalog::NOISE_ALONG_SIGHT, kind, About::Fit)
+                .with("body", Fact::name(of.body))
         };
-        let finding = Finding::of_kind(catalog::NOISE_ALONG_SIGHT, kind, About::Fit)
-            .with("body", Fact::name(of.body))
-            .with("along", Fact::meters(of.along))
-            .with("across", Fact::meters(of.across))
-            .with_some("distance", sight.growth.positions.map(Fact::meters));
+        let depth = |kind| {
+            finding(kind)
+                .with("along", Fact::meters(of.along))
+                .with("across", Fact::meters(of.across))
+        };
+        let finding = match (of.turns, sight.growth.positions) {
+            (Some([tilt, about]), _) if of.along < CLEARLY * of.across => finding("tilt")
+                .with("tilt", Fact::radians(tilt))
+                .with("about", Fact::radians(about)),
+            (_, Some(from)) => depth("growing").with("distance", Fact::meters(from)),
+            (_, None) => depth("same"),
+        };
         said.push((sight.along, finding));
     }
     said.into_iter().map(|(_, finding)| finding).collect()
