@@ -75,7 +75,7 @@ fn filled(template: &str, facts: &Facts) -> (String, bool) {
 }
 
 /// `key` or `key:form`, where a form begins with a letter.
-fn is_place(inside: &str) -> bool {
+pub(crate) fn is_place(inside: &str) -> bool {
     let (key, form) = inside.split_once(':').unwrap_or((inside, "form"));
     let is_key = |b: u8| b.is_ascii_lowercase() || b == b'_';
     let is_form = |b: u8| b.is_ascii_lowercase() || b == b'-' || b == b' ';

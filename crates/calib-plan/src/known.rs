@@ -7,6 +7,7 @@ use calib_core::Settings;
 use calib_geometry::registration::rigid_registration;
 use calib_pipeline::PipelineError;
 use calib_pipeline::estimate::start::Start;
+use calib_pipeline::formulate::along_sight;
 use calib_pipeline::formulate::cameras::{self, Outcome};
 use calib_pipeline::formulate::checked::check_data;
 use calib_pipeline::formulate::formulation::FreeSet;
@@ -150,6 +151,16 @@ impl Known {
             match with.filter(|_| outcome == Outcome::Taken) {
                 Some(with) => fit = with,
                 None => cameras::make_equal(&mut inputs),
+            }
+        }
+        // And that along the line of sight.
+        if let Some(told) = along_sight::told(&inputs, &fit) {
+            let before = std::mem::replace(&mut inputs.sights, told);
+            let with = ml::fit(state(&inputs), &inputs, &settings).ok();
+            let seen = (&inputs, &checked.tracks);
+            match with.filter(|with| along_sight::is_better(seen, with, &fit, &settings)) {
+                Some(with) => fit = with,
+                None => inputs.sights = before,
             }
         }
         let found = fit.solution.parameters.iter();

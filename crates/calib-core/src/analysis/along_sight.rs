@@ -8,8 +8,9 @@
 //!   + n ( 3/2 ln s(φ) − ln s(φ⊥/b) − ½ ln s(φ∥/a) ) − Σ ln b²a                                   (1)
 //! ```
 //!
-//! s is the mean square of one component. The second line is of poses; each statement of the noise has the levels that fit it best. No instrument knows depth
-//! better than place, or an angle about the line worse than one across it: where the residuals say so, something else made them, and the line counts 0.
+//! s is the mean square of one component. The second line is of poses; each statement of the noise has the levels that fit it best. Where depth
+//! is known better than place, or an angle about the line worse than one across it, the line counts 0: a laser tracker sees so,
+//! but a tracker that turns a little from row to row makes the same residuals.
 
 use calib_geometry::statistics::median;
 use nalgebra::Vector3;
@@ -217,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn depth_that_is_known_better_than_place_is_nothing_of_an_instrument() {
+    fn depth_that_is_known_better_than_place_is_not_looked_for() {
         let seen = seen(0.2, false);
         let by = likelier(seen.iter().copied(), 1.3, Larger::Along);
         assert_eq!(by, Some(Likelier::default()));

@@ -225,6 +225,18 @@ mod tests {
     }
 
     #[test]
+    fn a_brace_that_is_text_is_written_once() {
+        for form in Id::all().into_iter().flat_map(|id| id.0.forms) {
+            for text in [form.text, form.remedy] {
+                for inside in text.split("{{").skip(1) {
+                    let inside = inside.split('}').next().unwrap_or_default();
+                    assert!(template::is_place(inside), "`{inside}` in {text}");
+                }
+            }
+        }
+    }
+
+    #[test]
     fn every_place_for_a_value_has_a_plain_key() {
         for form in Id::all().into_iter().flat_map(|id| id.0.forms) {
             for key in template::keys(form.text) {

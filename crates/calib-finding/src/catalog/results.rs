@@ -164,22 +164,22 @@ super::topic! {
             "No action is needed. Keep the places of the cameras in the profile true: they are part of the weights.";
         "doubted": Warning,
             "The cameras of the profile would make the noise of a marker {ratio} times as large along one direction as along another (median), but left-out poses are likelier with equal noise, which the fit uses.",
-            "Check the places and fields of the cameras (`plan: {{cameras: …}}`): the σ of a plan that was made with them does not hold.";
+            "Check the places and fields of the cameras (`plan: {cameras: …}`): the σ of a plan that was made with them does not hold.";
         "no_fit": Warning,
             "The cameras of the profile would make the noise of a marker {ratio} times as large along one direction as along another (median). With that noise the fit has no result or does not converge: it uses equal noise.",
-            "Check the places and fields of the cameras (`plan: {{cameras: …}}`): two in one place say nothing of depth.";
+            "Check the places and fields of the cameras (`plan: {cameras: …}`): two in one place say nothing of depth.";
     }
     /// Noise along the line of sight is another than across it.
     NOISE_ALONG_SIGHT = "noise-along-sight" {
         "same": Info,
             "The tracker knows depth less well than place: along the line of sight, from the origin of its frame, body `{body}` scatters by {along}, across it by {across} per coordinate. Left-out poses are likelier with these levels, and the fit weighs by them.",
-            "If the tracker is a single camera, or has few on one side, state it: `tracker: {{body_sight_sigma_mm: …}}`, for markers `marker_sight_sigma_mm`. Otherwise compare a length along the line of sight with a known one: a wrong scale looks alike.";
+            "If the tracker is a single camera, or has few on one side, state it: `tracker: {body_sight_sigma_mm: …}`, for markers `marker_sight_sigma_mm`. Otherwise compare a length along the line of sight with a known one: a wrong scale looks alike.";
         "tilt": Info,
             "The tracker knows the tilt of body `{body}` less well than its angle about the line of sight from the origin of the tracker's frame: {tilt} about the axes across the line, {about} about it. Left-out poses are likelier with these levels, and the fit weighs by them.",
-            "If the tracker is a single camera, state it: `tracker: {{body_sight_sigma_deg: …}}`. Otherwise no action is needed.";
+            "If the tracker is a single camera, state it: `tracker: {body_sight_sigma_deg: …}`. Otherwise no action is needed.";
         "growing": Info,
             "The tracker knows depth less well than place, and less the farther away: along the line of sight, from the origin of its frame, body `{body}` scatters by {along} at {distance}, across it by {across} per coordinate. The first grows with the square of the distance, the second with the distance. Left-out poses are likelier with these levels, and the fit weighs by them.",
-            "If the tracker is a single camera, or has few on one side, state it: `tracker: {{body_sight_sigma_mm: …}}`, for markers `marker_sight_sigma_mm`. Otherwise compare a length along the line of sight with a known one: a wrong scale looks alike.";
+            "If the tracker is a single camera, or has few on one side, state it: `tracker: {body_sight_sigma_mm: …}`, for markers `marker_sight_sigma_mm`. Otherwise compare a length along the line of sight with a known one: a wrong scale looks alike.";
     }
     /// Measured poses have the errors of their inverses, or the other way round.
     NOISE_OF_INVERSE = "noise-of-inverse" {

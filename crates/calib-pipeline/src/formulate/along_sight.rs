@@ -38,7 +38,7 @@ pub fn told(inputs: &Inputs, fit: &MlFit) -> Option<Sights> {
     let mut by_body: BTreeMap<&str, Vec<AlongSight>> = BTreeMap::new();
     for shown in fit.solution.likelier_along_sight_by() {
         let name = measurements[shown.measurement.index()].name.as_str();
-        // What was computed from markers was seen as these, and stated cameras say what they cause themselves.
+        // Stated cameras say what they cause themselves, and points that stand for many markers have shapes of their own.
         let is_measured = match profile.bodies.get(name).map(|body| &body.kind) {
             Some(BodyKind::Pose) => true,
             Some(BodyKind::Markers { .. }) => {
@@ -115,11 +115,13 @@ pub fn is_better(
     if !of_sight(with).into_iter().all(plausible) {
         return false;
     }
-    match with.solution.likelier_by(&before.solution, settings) {
-        Some(by) if before.has_sight() => by > 0.0,
-        Some(by) => by > SHOWN,
-        None => kept(with) > kept(before),
+    // With rows left out as a whole, the two have other observations.
+    if with.solution.weights.len() != before.solution.weights.len() {
+        return kept(with) > kept(before);
     }
+    let by = with.solution.likelier_by(&before.solution, settings);
+    let enough = if before.has_sight() { 0.0 } else { SHOWN };
+    by.is_some_and(|by| by > enough)
 }
 
 /// Depth that is known less well than place by less is none to speak of.
