@@ -5,7 +5,10 @@ use crate::scratch;
 use std::fmt::Write as _;
 
 use calib_urdf::RobotModel;
-use nalgebra::{Isometry3, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{
+    Cholesky, Isometry3, Matrix2x3, Matrix6, SMatrix, Translation3, UnitQuaternion, Vector3,
+    Vector6,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -57,8 +60,74 @@ struct Way {
     states_inverse: bool,
 }
 
+/// How the instrument errs.
+#[derive(Clone, Copy)]
+enum Detector {
+    /// By [`SIGMA`] in all directions.
+    Even,
+    /// As a camera that looks at the board and finds its corners to so many pixels.
+    Pixels(f64),
+}
+
+impl Detector {
+    /// A measured pose of the board in the instrument's frame.
+    fn measured(self, seen: Isometry3<f64>, rng: &mut ChaCha8Rng) -> Isometry3<f64> {
+        match self {
+            Self::Even => seen * Isometry3::new(normal(rng, SIGMA.0), normal(rng, SIGMA.1)),
+            Self::Pixels(sigma) => {
+                let root = Cholesky::new(by_corners(&seen, sigma))
+                    .expect("definite")
+                    .l();
+                let normal: Vector6<f64> = Vector6::from_fn(|_, _| StandardNormal.sample(rng));
+                let error = root * normal;
+                let rotation =
+                    UnitQuaternion::from_scaled_axis(error.fixed_rows::<3>(0).into_owned());
+                let place = seen.translation.vector + error.fixed_rows::<3>(3);
+                Isometry3::from_parts(place.into(), rotation * seen.rotation)
+            }
+        }
+    }
+}
+
+/// Covariance of rotation (rad, in the instrument's axes) and position (m) of a board of 5 × 5 corners on 120 mm, before a camera with a focal length of
+/// 1 200 pixels that looks at it: of least squares on the corners' places in the image.
+fn by_corners(seen: &Isometry3<f64>, pixels: f64) -> Matrix6<f64> {
+    const FOCAL: f64 = 1200.0;
+    let place = seen.translation.vector;
+    let to_camera = UnitQuaternion::rotation_between(&place, &Vector3::z()).expect("in front");
+    let to_camera = to_camera.to_rotation_matrix();
+    let mut information = Matrix6::zeros();
+    for corner in 0..25 {
+        let [i, j] = [corner % 5, corner / 5].map(|k| 0.03 * (f64::from(k) - 2.0));
+        let arm = seen.rotation * Vector3::new(i, j, 0.0);
+        let p = to_camera * (arm + place);
+        let image = Matrix2x3::new(
+            1.0 / p.z,
+            0.0,
+            -p.x / (p.z * p.z),
+            0.0,
+            1.0 / p.z,
+            -p.y / (p.z * p.z),
+        ) * FOCAL
+            * to_camera;
+        let mut row = SMatrix::<f64, 2, 6>::zeros();
+        row.fixed_columns_mut::<3>(0)
+            .copy_from(&(-image * arm.cross_matrix()));
+        row.fixed_columns_mut::<3>(3).copy_from(&image);
+        information += row.transpose() * row / (pixels * pixels);
+    }
+    information
+        .try_inverse()
+        .expect("a board in a plane is seen")
+}
+
 /// Postures of the robot before a board that is 0.4 to 1 m away, and what is measured there.
-fn table(robot: &RobotModel, way: Way, rows: usize, rng: &mut ChaCha8Rng) -> String {
+fn table(
+    robot: &RobotModel,
+    (way, detector): (Way, Detector),
+    rows: usize,
+    rng: &mut ChaCha8Rng,
+) -> String {
     let link = robot.link_id("l6").expect("a link");
     let mount = Isometry3::new(
         Vector3::new(0.05, -0.03, 0.04),
@@ -88,8 +157,7 @@ fn table(robot: &RobotModel, way: Way, rows: usize, rng: &mut ChaCha8Rng) -> Str
             true => camera_from_board,
             false => camera_from_board.inverse(),
         };
-        let noise = Isometry3::new(normal(rng, SIGMA.0), normal(rng, SIGMA.1));
-        let measured = measured * noise;
+        let measured = detector.measured(measured, rng);
         let stated = match way.camera_on_flange == way.states_inverse {
             true => measured,
             false => measured.inverse(),
@@ -104,8 +172,13 @@ fn table(robot: &RobotModel, way: Way, rows: usize, rng: &mut ChaCha8Rng) -> Str
     text
 }
 
-/// The report of a session, and where the data put it.
+/// The report of a session of an instrument that errs alike in all directions.
 fn judged(way: Way, seed: u64) -> Value {
+    judged_by((way, Detector::Even), seed)
+}
+
+/// The report of a session.
+fn judged_by((way, detector): (Way, Detector), seed: u64) -> Value {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let robot = RobotModel::from_urdf_text(&urdf(3e-4, &mut rng), "arm").expect("an arm");
     let inverted = match way.states_inverse {
@@ -115,18 +188,24 @@ fn judged(way: Way, seed: u64) -> Value {
     let columns = format!(
         "columns: {{bodies: {{camera: {{position: [x_m, y_m, z_m], quaternion_xyzw: [qx, qy, qz, qw]{inverted}}}}}}}"
     );
+    let stated = match detector {
+        Detector::Even => format!(
+            ", body_sigma_mm: {}, body_sigma_deg: {}",
+            SIGMA.0 * 1e3,
+            SIGMA.1.to_degrees()
+        ),
+        Detector::Pixels(_) => String::new(),
+    };
     let profile = format!(
-        "calib: 1\nrobot: {{name: arm, urdf: arm.urdf}}\ntracker: {{frame: board, body_sigma_mm: {}, body_sigma_deg: {}}}\n\
+        "calib: 1\nrobot: {{name: arm, urdf: arm.urdf}}\ntracker: {{frame: board{stated}}}\n\
          bodies:\n  camera: {{link: l6, pose: true}}\nrecordings:\n  poses: {{file: poses.csv, use: static, {columns}}}\n  \
          checks: {{file: checks.csv, use: validation, {columns}}}\nsolve:\n  free: [bodies, tracker, joint_offsets, joint_axes]\n  \
-         prior: {{position_mm: 3, angle_deg: 0.3, offset_deg: 0.5}}\n  limits: {{held_out_rms_mm: 6, held_out_max_mm: 15}}\n",
-        SIGMA.0 * 1e3,
-        SIGMA.1.to_degrees()
+         prior: {{position_mm: 3, angle_deg: 0.3, offset_deg: 0.5}}\n  limits: {{held_out_rms_mm: 6, held_out_max_mm: 15}}\n"
     );
     let dir = Scratch::new()
         .file("arm.urdf", urdf(0.0, &mut rng))
-        .file("poses.csv", table(&robot, way, 60, &mut rng))
-        .file("checks.csv", table(&robot, way, 20, &mut rng))
+        .file("poses.csv", table(&robot, (way, detector), 60, &mut rng))
+        .file("checks.csv", table(&robot, (way, detector), 20, &mut rng))
         .file("arm.yaml", profile);
     let ran = dir.calib(["run", "arm.yaml", "--out", "out"]);
     assert!(ran.code < 2, "{}{}", ran.stdout, ran.stderr);
@@ -204,4 +283,31 @@ fn poses_that_were_inverted_by_software_have_the_noise_of_what_was_measured() {
     for ratio in noise(&report) {
         assert!(OF_STATED.contains(&ratio), "{ratio}");
     }
+}
+
+/// What calculates the noise here is a camera, not the model of the fit: σ along the line of sight is several times that across it, and differs with the
+/// angle at which the board is seen. Correct rows that look like outliers remain in some sessions,
+/// and held-out errors that exceed what is stated.
+#[test]
+fn a_camera_that_errs_in_pixels_has_noise_along_its_line_of_sight() {
+    let (mut with_outliers, mut accepted) = (0, 0);
+    for camera_on_flange in [true, false] {
+        let way = Way {
+            camera_on_flange,
+            states_inverse: camera_on_flange,
+        };
+        for seed in 0..4 {
+            let report = judged_by((way, Detector::Pixels(0.2)), 50 + seed);
+            let told = named(&report, "noise-along-sight").expect("named");
+            let [along, across] =
+                ["along", "across"].map(|key| told["facts"][key]["value"].as_f64().expect("m"));
+            assert!(along > 3.0 * across, "{told}");
+            with_outliers += usize::from(named(&report, "row-outlier").is_some());
+            let verdict = report["verdict"].as_str().expect("a word");
+            assert_ne!(verdict, "rejected", "{seed}");
+            accepted += usize::from(verdict.starts_with("accepted"));
+        }
+    }
+    assert!(with_outliers <= 4, "{with_outliers} of 8");
+    assert!(accepted >= 6, "{accepted} of 8");
 }

@@ -1,4 +1,4 @@
-//! Trackers that know depth less well than place: one camera beside the robot or on it, and few cameras on one side.
+//! Trackers that are noisier along the line of sight: one camera beside the robot or on it, and cameras on one side.
 
 use serde_json::Value;
 
@@ -126,7 +126,7 @@ fn sigma(report: &Value, group: &str) -> f64 {
         .expect("σ")
 }
 
-/// Forty poses show a σ along one line to 11 %, of which the parameters take a part.
+/// Forty poses show a σ along one line to 11 %; the range is four times that, for the share of the residuals that the parameters take.
 fn assert_levels(report: &Value, seen: Seen, of: Sigma, seed: u64) {
     let groups: &[(&str, f64)] = match seen {
         Seen::Markers => &[
@@ -149,7 +149,7 @@ fn assert_levels(report: &Value, seen: Seen, of: Sigma, seed: u64) {
     }
 }
 
-/// Of depth that is six times worse than place, no profile says a word: the residuals show it, good rows stay, and the verdict is that of the robot.
+/// The profile states one σ, the depth is six times noisier: the residuals show it, correct rows are kept, and the verdict is that of the robot.
 #[test]
 fn noise_along_the_line_of_sight_is_found_and_good_rows_stay() {
     let (mut with_outliers, mut accepted) = (0, 0);
@@ -172,7 +172,7 @@ fn noise_along_the_line_of_sight_is_found_and_good_rows_stay() {
     assert!(accepted >= 11, "{accepted} of 12");
 }
 
-/// Eight nats are more than chance: none of 24 sessions of equal noise is told of a line of sight.
+/// None of 24 sessions of equal noise has the finding.
 #[test]
 fn equal_noise_has_no_line_of_sight() {
     for seen in ALL {
@@ -186,7 +186,7 @@ fn equal_noise_has_no_line_of_sight() {
     }
 }
 
-/// Of a board that is seen well but tilts are, the finding speaks of angles alone.
+/// Where only the orientations differ, the finding states orientations.
 #[test]
 fn a_tilt_that_is_known_less_well_is_named_as_such() {
     let tilt = Sigma {
@@ -201,7 +201,7 @@ fn a_tilt_that_is_known_less_well_is_named_as_such() {
     }
 }
 
-/// What the profile states is compared with what is found, and needs no word.
+/// What the profile states is compared with the estimate, and there is no finding.
 #[test]
 fn a_stated_noise_along_the_line_of_sight_is_the_tracker_s() {
     // A laser tracker knows the distance better than the rest.

@@ -180,8 +180,11 @@ fn scale(unit: Unit, form: &str) -> (f64, &'static str) {
 
 /// A number in the unit that `form` names, else in the unit that people read.
 fn lone(value: f64, unit: Unit, form: &str) -> String {
-    if form == "yaml-ms" {
-        return format!("{:.1}", value * 1e3);
+    match form {
+        "yaml-ms" => return format!("{:.1}", value * 1e3),
+        // What people read, without its unit and with the minus of data.
+        "yaml" => return significant(value * unit.display().0).replace('−', "-"),
+        _ => {}
     }
     if let Some(word) = word(form, value) {
         return word.to_owned();
@@ -234,6 +237,10 @@ mod tests {
     #[test]
     fn values_in_the_unit_that_people_read() {
         let said = |template| fill(template, &facts());
+        assert_eq!(
+            said("a_mm: {length:yaml}, b_deg: {angle:yaml}"),
+            "a_mm: 1.23, b_deg: -30"
+        );
         assert_eq!(
             said("{length}, {length:um}, {length:m}"),
             "1.23 mm, 1235 µm, 0.001 m"

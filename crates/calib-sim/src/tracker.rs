@@ -118,7 +118,7 @@ impl<'a> Tracker<'a> {
                     };
                     let [angle, position] = [noise.body.angle, noise.body.position];
                     let mut drawn =
-                        |across: f64, along| error(rng, (across, along), &line, noise_times);
+                        |across: f64, along| drawn_error(rng, (across, along), &line, noise_times);
                     let error = Twist::new(
                         drawn(angle, noise.body_sight_rad),
                         drawn(position, noise.body_sight),
@@ -136,7 +136,7 @@ impl<'a> Tracker<'a> {
                         let p_body = self.plan.mounts[name].markers[marker];
                         let at = tracker_from_body * p_body;
                         let levels = (noise.marker, noise.marker_sight);
-                        let error = error(rng, levels, &at.coords, noise_times);
+                        let error = drawn_error(rng, levels, &at.coords, noise_times);
                         let seen = rng.random::<f64>() >= noise.occluded;
                         let error = self.factor(&at).map_or(error, |factor| factor * error);
                         let sample = seen.then(|| at + error);
@@ -150,7 +150,7 @@ impl<'a> Tracker<'a> {
 }
 
 /// Three components with σ across a line and, where that differs, along it.
-fn error(
+fn drawn_error(
     rng: &mut ChaCha12Rng,
     (across, along): (f64, Option<f64>),
     line: &Vector3<f64>,

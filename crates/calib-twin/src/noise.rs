@@ -34,7 +34,7 @@ pub struct SightNoise {
 }
 
 impl SightNoise {
-    /// σ across the line and along it of positions, and of orientations about the axes across it and along it, of what is at a distance, m.
+    /// σ of orientations about the axes across the line and about it, rad, and of positions across it and along it, m, of what is at a distance, m.
     pub(crate) fn levels(&self, [turn, shift]: [f64; 2], distance: f64) -> [[f64; 2]; 2] {
         let [across, along] = growth(self.growth.positions, distance);
         let [about, tilt] = growth(self.growth.orientations, distance);
@@ -63,12 +63,7 @@ impl Noise {
         let problem = &formulation.problem;
         let mut noise = Self::default();
         for measurement in problem.measurements() {
-            let sight = match &measurement.kind {
-                MeasurementKind::Markers(of) => of.sight,
-                MeasurementKind::Poses(of) => of.sight,
-                _ => None,
-            };
-            if let Some(sight) = sight {
+            if let Some(sight) = measurement.kind.sight() {
                 let levels = SightNoise {
                     along: sigma(sight.along),
                     about: sight.about.map_or(0.0, sigma),

@@ -18,9 +18,6 @@ use nalgebra::Vector3;
 use crate::analysis::solution::Solution;
 use crate::graph::ids::MeasurementId;
 use crate::graph::measurement::{MeasurementKind, PoseNoise, growth};
-use crate::model::cache::State;
-use crate::model::path::Derivatives;
-use crate::solve::equations::Workspace;
 
 /// What the residuals of a measurement say of its noise along the line of sight.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -81,45 +78,31 @@ impl Solution {
     /// thousand samples only.
     #[must_use]
     pub fn likelier_along_sight_by(&self) -> Vec<AlongSight> {
-        let problem = &self.model.problem;
-        let fitted = |(o, weight): (usize, &f64)| {
-            let held_out = self.model.is_held_out(self.model.observations[o].sample);
-            f64::from(u8::from(*weight > 0.0 && !held_out))
-        };
-        let mask: Vec<f64> = self.weights.iter().enumerate().map(fitted).collect();
+        let measurements = &self.model.problem.measurements;
         let mut seen: Vec<Vec<Seen>> = Vec::new();
-        seen.resize_with(problem.measurements.len(), Vec::new);
-        let mut work = Workspace::new(&self.model);
-        work.cache.update(problem, &self.values);
-        let state = State::new(problem, &work.cache, &self.values);
-        for sample in self.looked_at().samples {
-            let rows = &mut work.rows;
-            rows.fill(&self.model, state, &mask, sample, Derivatives::None);
-            for &(o, first, _) in &rows.blocks {
-                let o = self.model.observations[o];
-                let kind = &problem.measurements[o.measurement].kind;
-                let three = |at: usize| kind.stated(o.item, &rows.r[first + at..]);
-                let (sight, position, orientation) = match &problem.measurements[o.measurement].kind
-                {
-                    MeasurementKind::Markers(of) if of.observations[o.item].shape.is_none() => {
-                        (of.observations[o.item].position.coords, three(0), None)
-                    }
-                    MeasurementKind::Poses(of) if matches!(of.noise, PoseNoise::Split { .. }) => {
-                        let sight = of.observations[o.item].line_of_sight();
-                        (sight, three(3), Some(three(0)))
-                    }
-                    _ => continue,
-                };
-                let Some(line) = sight.try_normalize(0.0) else {
-                    continue;
-                };
-                seen[o.measurement].push(Seen {
-                    distance: sight.norm(),
-                    position: Parts::of(&position, &line),
-                    orientation: orientation.map(|turn| Parts::of(&turn, &line)),
-                });
-            }
-        }
+        seen.resize_with(measurements.len(), Vec::new);
+        self.for_each_fitted(|o, rows| {
+            let kind = &measurements[o.measurement].kind;
+            let three = |at: usize| kind.stated(o.item, &rows[at..]);
+            let (sight, position, orientation) = match kind {
+                MeasurementKind::Markers(of) if of.observations[o.item].shape.is_none() => {
+                    (of.observations[o.item].position.coords, three(0), None)
+                }
+                MeasurementKind::Poses(of) if matches!(of.noise, PoseNoise::Split { .. }) => {
+                    let sight = of.observations[o.item].line_of_sight();
+                    (sight, three(3), Some(three(0)))
+                }
+                _ => return,
+            };
+            let Some(line) = sight.try_normalize(0.0) else {
+                return;
+            };
+            seen[o.measurement].push(Seen {
+                distance: sight.norm(),
+                position: Parts::of(&position, &line),
+                orientation: orientation.map(|turn| Parts::of(&turn, &line)),
+            });
+        });
         let of = |(m, seen): (usize, Vec<Seen>)| {
             let distance = median(seen.iter().map(|s| s.distance).collect())?;
             let positions = seen.iter().map(|s| (s.distance, s.position));

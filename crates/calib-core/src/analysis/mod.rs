@@ -10,6 +10,7 @@ pub(crate) mod compare;
 pub(crate) mod dependence;
 pub(crate) mod estimate;
 mod finish;
+mod fitted_rows;
 pub(crate) mod folds;
 pub(crate) mod gauge;
 pub(crate) mod gear_ratio;

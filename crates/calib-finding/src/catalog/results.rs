@@ -169,17 +169,17 @@ super::topic! {
             "The cameras of the profile would make the noise of a marker {ratio} times as large along one direction as along another (median). With that noise the fit has no result or does not converge: it uses equal noise.",
             "Check the places and fields of the cameras (`plan: {cameras: …}`): two in one place say nothing of depth.";
     }
-    /// Noise along the line of sight is another than across it.
+    /// The noise along the line of sight differs from that across it.
     NOISE_ALONG_SIGHT = "noise-along-sight" {
         "same": Info,
-            "The tracker knows depth less well than place: along the line of sight, from the origin of its frame, body `{body}` scatters by {along}, across it by {across} per coordinate. Left-out poses are likelier with these levels, and the fit weighs by them.",
-            "If the tracker is a single camera, or has few on one side, state it: `tracker: {body_sight_sigma_mm: …}`, for markers `marker_sight_sigma_mm`. Otherwise compare a length along the line of sight with a known one: a wrong scale looks alike.";
+            "The tracker is noisier along the line of sight from the origin of its frame than across it: the positions of body `{body}` have σ = {along} along the line and {across} per coordinate across it. Left-out poses are more likely with these two levels, and the fit uses them.",
+            "If the tracker is a single camera, or all its cameras are on one side, state the noise: `tracker: {{key_across}: {across:yaml}, {key_along}: {along:yaml}}`. Otherwise compare a length along the line of sight with a known one: a wrong scale of the tracker has the same effect.";
         "tilt": Info,
-            "The tracker knows the tilt of body `{body}` less well than its angle about the line of sight from the origin of the tracker's frame: {tilt} about the axes across the line, {about} about it. Left-out poses are likelier with these levels, and the fit weighs by them.",
-            "If the tracker is a single camera, state it: `tracker: {body_sight_sigma_deg: …}`. Otherwise no action is needed.";
+            "The tracker measures the tilt of body `{body}` less precisely than its rotation about the line of sight from the origin of the tracker's frame: σ = {tilt} about the axes across the line and {about} about the line. Left-out poses are more likely with these two levels, and the fit uses them.",
+            "If the tracker is a single camera, state the noise: `tracker: {body_sigma_deg: {tilt:yaml}, body_sight_sigma_deg: {about:yaml}}`. Otherwise no action is needed.";
         "growing": Info,
-            "The tracker knows depth less well than place, and less the farther away: along the line of sight, from the origin of its frame, body `{body}` scatters by {along} at {distance}, across it by {across} per coordinate. The first grows with the square of the distance, the second with the distance. Left-out poses are likelier with these levels, and the fit weighs by them.",
-            "If the tracker is a single camera, or has few on one side, state it: `tracker: {body_sight_sigma_mm: …}`, for markers `marker_sight_sigma_mm`. Otherwise compare a length along the line of sight with a known one: a wrong scale looks alike.";
+            "The tracker is noisier along the line of sight from the origin of its frame than across it, and its noise grows with the distance: at {distance:m}, the positions of body `{body}` have σ = {along} along the line, in proportion to the square of the distance, and {across} per coordinate across it, in proportion to the distance. Left-out poses are more likely with these levels, and the fit uses them.",
+            "If the tracker is a single camera, or all its cameras are on one side, state the noise at this distance: `tracker: {{key_across}: {across:yaml}, {key_along}: {along:yaml}}`. Otherwise compare a length along the line of sight with a known one: a wrong scale of the tracker has the same effect.";
     }
     /// Measured poses have the errors of their inverses, or the other way round.
     NOISE_OF_INVERSE = "noise-of-inverse" {

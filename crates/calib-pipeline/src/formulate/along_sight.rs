@@ -1,14 +1,14 @@
 //! Whether the noise of bodies is another along the line of sight than across it.
 //!
-//! A single camera, or a few on one side, know depth several times worse than place, and the farther the worse. With equal noise, good rows are then
-//! gross errors, and the rest spends the certainty across the line on depth. The residuals tell, [`Solution::likelier_along_sight_by`]; what
-//! they say is tried by fitting again, and taken where left-out poses are likelier by more than chance.
+//! A single camera, or several on one side, measure depth less precisely than the directions across the line, and both less precisely the farther
+//! away. With equal noise, correct rows are then outliers, and the precise directions get too little weight. The residuals show it,
+//! [`Solution::likelier_along_sight_by`]; the fit is repeated with levels along the line, and kept where left-out poses are more likely by more than chance.
 //!
 //! [`Solution::likelier_along_sight_by`]: calib_core::Solution::likelier_along_sight_by
 
 use std::collections::BTreeMap;
 
-use calib_core::measurement::{Growth, Sight, growth};
+use calib_core::measurement::{Growth, Sight, growth as factors};
 use calib_core::{AlongSight, GroupId, Likelier, MeasurementKind, PoseNoise, Settings};
 use calib_finding::{About, Fact, Finding, catalog};
 use calib_geometry::statistics::median;
@@ -24,6 +24,8 @@ const TRIED: f64 = 8.0;
 const GROWTH: f64 = 2.0;
 /// Across the line of sight no tracker scatters by more than this many times what is stated of it, or what its markers do about their bodies.
 const ACROSS: f64 = 2.0;
+/// From this many times the σ across the line of sight on, the σ along it is what the finding states; below, it states the orientations.
+const CLEARLY: f64 = 1.5;
 /// Left-out poses must be likelier by this many standard errors (paired over the poses).
 const SHOWN: f64 = 2.0;
 
@@ -124,9 +126,6 @@ pub fn is_better(
     by.is_some_and(|by| by > enough)
 }
 
-/// Depth that is known less well than place by less is none to speak of.
-const CLEARLY: f64 = 1.5;
-
 /// Levels of a body with noise of its own along the line of sight, m.
 struct OfSight<'a> {
     body: &'a str,
@@ -178,9 +177,15 @@ pub(crate) fn findings(inputs: &Inputs, fit: &MlFit) -> Vec<Finding> {
                 .with("body", Fact::name(of.body))
         };
         let depth = |kind| {
+            let (across, along) = match of.turns.is_some() {
+                true => ("body_sigma_mm", "body_sight_sigma_mm"),
+                false => ("marker_sigma_mm", "marker_sight_sigma_mm"),
+            };
             finding(kind)
                 .with("along", Fact::meters(of.along))
                 .with("across", Fact::meters(of.across))
+                .with("key_across", Fact::name(across))
+                .with("key_along", Fact::name(along))
         };
         let finding = match (of.turns, sight.growth.positions) {
             (Some([tilt, about]), _) if of.along < CLEARLY * of.across => finding("tilt")
@@ -203,38 +208,44 @@ fn two_digits(distance: f64) -> f64 {
 /// Mean variance of a coordinate over what was seen at these distances, from those across the line of sight and along it, m².
 #[must_use]
 pub(crate) fn coordinate(
-    (across, along): (f64, f64),
-    grows_from: Option<f64>,
+    levels: (f64, f64),
+    growth: Growth,
     distances: impl Iterator<Item = f64>,
 ) -> f64 {
-    let (mut sum, mut count) = (0.0, 0.0);
-    for distance in distances {
-        let [a, b] = growth(grows_from, distance);
-        sum += (2.0 * across * a * a + along * b * b) / 3.0;
-        count += 1.0;
-    }
-    if count > 0.0 { sum / count } else { across }
+    mean(levels, distances.map(|d| factors(growth.positions, d)))
 }
 
 /// Mean variance of a body's orientation about an axis over where it was seen, rad²; `None` where the line of sight has no level of its own.
 #[must_use]
 pub(crate) fn orientation(fit: &MlFit, body: &str) -> Option<f64> {
-    let variance = |group: GroupId| fit.solution.noise[group.index()].sigma.powi(2);
     let mut measurements = fit.formulation.problem.measurements().iter();
-    measurements.find_map(|m| match &m.kind {
-        MeasurementKind::Poses(of) if m.name == body => {
-            let PoseNoise::Split { orientation, .. } = of.noise else {
-                return None;
-            };
-            let sight = of.sight?;
-            let (tilt, about) = (variance(orientation), variance(sight.about?));
-            let factors = of.observations.iter().map(|o| {
-                let [image, depth] =
-                    growth(sight.growth.orientations, o.pose.translation.vector.norm());
-                (2.0 * tilt * depth * depth + about * image * image) / 3.0
-            });
-            Some(factors.sum::<f64>() / of.observations.len() as f64)
-        }
-        _ => None,
-    })
+    let measurement = measurements.find(|m| m.name == body && m.kind.sight().is_some())?;
+    let MeasurementKind::Poses(of) = &measurement.kind else {
+        return None;
+    };
+    let PoseNoise::Split { orientation, .. } = of.noise else {
+        return None;
+    };
+    let sight = of.sight?;
+    let variance = |group: GroupId| fit.solution.noise[group.index()].sigma.powi(2);
+    let distances = of.observations.iter();
+    let distances = distances.map(|o| o.pose.translation.vector.norm());
+    let swapped = distances.map(|d| {
+        let [image, depth] = factors(sight.growth.orientations, d);
+        [depth, image]
+    });
+    Some(mean(
+        (variance(orientation), variance(sight.about?)),
+        swapped,
+    ))
+}
+
+/// Mean of two variances across a line and one along it, with the factors of their σ.
+fn mean((across, along): (f64, f64), factors: impl Iterator<Item = [f64; 2]>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0.0);
+    for [a, b] in factors {
+        sum += (2.0 * across * a * a + along * b * b) / 3.0;
+        count += 1.0;
+    }
+    if count > 0.0 { sum / count } else { across }
 }

@@ -63,9 +63,8 @@ pub fn likelihood(
     };
     let place = places::likeliest(inputs, checked, &settings, progress)?;
     checked.findings.extend(place);
-    let as_read = which_side::matters(inputs).then(|| (inputs.clone(), checked.tracks.clone()));
+    let mut as_read = which_side::matters(inputs).then(|| now(inputs, checked));
     let found = sided(inputs, checked, &how, progress)?;
-    let mut as_read = as_read;
     let found = from_its_side(inputs, checked, (&how, &mut as_read), found, progress)?;
     let found = along_its_sight(inputs, checked, (&how, as_read), found, progress)?;
     let (mut registered, mut fit, mut of_rows) =
@@ -165,35 +164,50 @@ fn from_its_side(
         return Ok(found);
     }
     // Rows are judged again with the noise of the other end.
-    let read = || (inputs.clone(), checked.tracks.clone());
-    let (mut exchanged, mut tracks) = as_read.clone().unwrap_or_else(read);
-    which_side::exchange(&mut exchanged, &mut tracks, &told);
-    if as_read.is_some() {
-        *as_read = Some((exchanged.clone(), tracks.clone()));
-    }
-    let inputs_of_found = std::mem::replace(inputs, exchanged);
-    let tracks_of_found = std::mem::replace(&mut checked.tracks, tracks);
+    let (mut read, mut tracks) = as_read.clone().unwrap_or_else(|| now(inputs, checked));
+    which_side::exchange(&mut read, &mut tracks, &told);
+    let exchanged = as_read.is_some().then(|| (read.clone(), tracks.clone()));
     progress("fit again with poses measured from their other end");
-    // What was fitted without this does not depend on a fit with it.
-    let again = sided(inputs, checked, how, progress).ok();
-    let settings = how.settings;
-    let better = |again: &Fits| {
-        let by = again.1.solution.likelier_by(&found.1.solution, settings);
+    let better = |_: &Inputs, _: &Checked, again: &Fits| {
+        let by = again
+            .1
+            .solution
+            .likelier_by(&found.1.solution, how.settings);
         by.is_some_and(|by| by > 0.0)
     };
-    match again.filter(better) {
-        Some(again) => {
-            checked.findings.extend(which_side::findings(inputs, &told));
-            Ok(again)
-        }
-        None => {
-            if let Some((read, tracks)) = as_read {
-                which_side::exchange(read, tracks, &told);
-            }
-            (*inputs, checked.tracks) = (inputs_of_found, tracks_of_found);
-            Ok(found)
-        }
+    let again = tried(inputs, checked, (how, (read, tracks)), &better, progress);
+    let Some(again) = again else {
+        return Ok(found);
+    };
+    *as_read = exchanged;
+    checked.findings.extend(which_side::findings(inputs, &told));
+    Ok(again)
+}
+
+/// Recordings and bodies as they are now.
+fn now(inputs: &Inputs, checked: &Checked) -> AsRead {
+    (inputs.clone(), checked.tracks.clone())
+}
+
+/// The fit of recordings that were read in another way, where it is better; else everything is as before. What was fitted without this does not
+/// depend on it.
+fn tried(
+    inputs: &mut Inputs,
+    checked: &mut Checked,
+    (how, (read, tracks)): (&How<'_>, AsRead),
+    better: &dyn Fn(&Inputs, &Checked, &Fits) -> bool,
+    progress: &mut dyn FnMut(&str),
+) -> Option<Fits> {
+    let inputs_before = std::mem::replace(inputs, read);
+    let tracks_before = std::mem::replace(&mut checked.tracks, tracks);
+    let findings_before = checked.findings.clone();
+    let again = sided(inputs, checked, how, progress).ok();
+    let again = again.filter(|again| better(inputs, checked, again));
+    if again.is_none() {
+        (*inputs, checked.tracks) = (inputs_before, tracks_before);
+        checked.findings = findings_before;
     }
+    again
 }
 
 /// What was found, or again with noise of its own along the line of sight, where the recordings say so.
@@ -214,24 +228,16 @@ fn along_its_sight(
             break;
         };
         // Rows are judged again: with equal noise those of uncertain depth are gross errors.
-        let read = || (inputs.clone(), checked.tracks.clone());
-        let (mut read, tracks) = as_read.clone().unwrap_or_else(read);
+        let (mut read, tracks) = as_read.clone().unwrap_or_else(|| now(inputs, checked));
         read.sights = told;
-        let inputs_of_found = std::mem::replace(inputs, read);
-        let tracks_of_found = std::mem::replace(&mut checked.tracks, tracks);
         progress("fit again with noise of its own along the line of sight");
-        // What was fitted without this does not depend on a fit with it.
-        let again = sided(inputs, checked, &how, progress).ok();
-        let better = |again: &Fits| {
-            let seen = (&*inputs, &checked.tracks);
+        let better = |inputs: &Inputs, checked: &Checked, again: &Fits| {
+            let seen = (inputs, &checked.tracks);
             along_sight::is_better(seen, &again.1, &found.1, how.settings)
         };
-        match again.filter(better) {
+        match tried(inputs, checked, (&how, (read, tracks)), &better, progress) {
             Some(again) => found = again,
-            None => {
-                (*inputs, checked.tracks) = (inputs_of_found, tracks_of_found);
-                break;
-            }
+            None => break,
         }
     }
     Ok(found)

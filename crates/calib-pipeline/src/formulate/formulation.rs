@@ -3,8 +3,8 @@
 use std::collections::BTreeMap;
 
 use calib_core::{
-    EdgeId, FrameId, GroupId, MeasurementKind, NoiseChoice, NoiseKind, NoiseModel, ParameterId,
-    PointId, Problem, Solution, WidthEstimate,
+    EdgeId, FrameId, GroupId, NoiseChoice, NoiseKind, NoiseModel, ParameterId, PointId, Problem,
+    Solution, WidthEstimate,
 };
 use calib_profile::SharedWidth;
 
@@ -155,11 +155,7 @@ impl MlFit {
     #[must_use]
     pub fn has_sight(&self) -> bool {
         let mut measurements = self.formulation.problem.measurements().iter();
-        measurements.any(|m| match &m.kind {
-            MeasurementKind::Markers(markers) => markers.sight.is_some(),
-            MeasurementKind::Poses(poses) => poses.sight.is_some(),
-            _ => false,
-        })
+        measurements.any(|m| m.kind.sight().is_some())
     }
 
     /// Noise of the reading of a joint that turns, rms over the joints that have any, rad; `None` where none has.

@@ -2,7 +2,10 @@
 
 use std::collections::BTreeMap;
 
-use calib_core::{FrameId, GroupId, MeasurementKind, NoiseEstimate, NoiseKind, PointId, PoseNoise};
+use calib_core::{
+    FrameId, GroupId, MarkerObservation, MeasurementKind, NoiseEstimate, NoiseKind, PointId,
+    PoseNoise,
+};
 use calib_report::{HeldOut, PoseError};
 
 use crate::formulate::along_sight::coordinate;
@@ -53,6 +56,7 @@ impl<'a> TrackerNoise<'a> {
         lacking: bool,
     ) -> Self {
         let stated = inputs.robot.profile.tracker.marker_coordinate();
+        let sight = inputs.robot.profile.tracker.sight.marker;
         let scatter = tracks.values().filter_map(|track| track.marker_sigma);
         let scatter = scatter.reduce(f64::max);
         // In units of the level that the fit began with.
@@ -66,8 +70,11 @@ impl<'a> TrackerNoise<'a> {
         Self::with(fit, &|of, found| {
             let times = match of {
                 Of::Marker => of_markers,
-                // All of the scatter may lie along one of three directions.
-                Of::MarkerAlong => of_markers.map(|times| times * f64::sqrt(3.0)),
+                // All of the scatter may lie along one of three directions; a level that is stated is that of this one.
+                Of::MarkerAlong if sight.is_none() => {
+                    of_markers.map(|times| times * f64::sqrt(3.0))
+                }
+                Of::MarkerAlong => of_markers,
                 Of::Pose => of_poses,
             };
             let most = times.map_or(f64::INFINITY, |times| times * found.stated);
@@ -94,27 +101,31 @@ impl<'a> TrackerNoise<'a> {
             match &measurement.kind {
                 MeasurementKind::Markers(seen) => {
                     // A point that stands for several markers, or the mean of a hold, has a shape of its own in each row.
-                    let mut shapes: BTreeMap<PointId, (f64, f64)> = BTreeMap::new();
+                    let mut of_points: BTreeMap<PointId, Vec<&MarkerObservation>> = BTreeMap::new();
                     for observation in &seen.observations {
-                        let shape = observation.shape.as_ref();
-                        let (sum, count) = shapes.entry(observation.point).or_default();
-                        *sum += shape.map_or(1.0, |s| s.trace() / 3.0);
-                        *count += 1.0;
+                        of_points
+                            .entry(observation.point)
+                            .or_default()
+                            .push(observation);
                     }
-                    for (point, (sum, count)) in shapes {
+                    for (point, observations) in of_points {
                         let name = markers.get(&point).copied();
-                        let of_point = seen.observations.iter().filter(|o| o.point == point);
-                        let distances = of_point.map(|o| o.position.coords.norm());
                         let variance = level(seen.noise_of(point), Of::Marker);
-                        let variance = match &seen.sight {
-                            None => variance.map(|v| v * sum / count),
-                            Some(sight) => {
-                                (variance.zip(level(sight.along, Of::MarkerAlong))).map(|levels| {
-                                    coordinate(levels, sight.growth.positions, distances)
-                                })
+                        let along = seen.sight.map(|sight| level(sight.along, Of::MarkerAlong));
+                        let growth = seen.sight.map(|sight| sight.growth).unwrap_or_default();
+                        let times = |o: &MarkerObservation, variance: f64| match (&o.shape, along) {
+                            (Some(shape), _) => variance * shape.trace() / 3.0,
+                            (None, Some(Some(along))) => {
+                                let distance = std::iter::once(o.position.coords.norm());
+                                coordinate((variance, along), growth, distance)
                             }
+                            (None, _) => variance,
                         };
-                        by_subject.extend(name.zip(variance));
+                        let mean = variance.map(|variance| {
+                            let all = observations.iter().map(|o| times(o, variance));
+                            all.sum::<f64>() / observations.len() as f64
+                        });
+                        by_subject.extend(name.zip(mean));
                     }
                 }
                 MeasurementKind::Poses(seen) => {
@@ -125,11 +136,8 @@ impl<'a> TrackerNoise<'a> {
                         let distances = distances.map(|o| o.pose.translation.vector.norm());
                         let variance = match &seen.sight {
                             None => across,
-                            Some(sight) => {
-                                (across.zip(level(sight.along, Of::Pose))).map(|levels| {
-                                    coordinate(levels, sight.growth.positions, distances)
-                                })
-                            }
+                            Some(sight) => (across.zip(level(sight.along, Of::Pose)))
+                                .map(|levels| coordinate(levels, sight.growth, distances)),
                         };
                         by_subject.extend(name.zip(variance));
                     }

@@ -122,13 +122,13 @@ pub struct RawTracker {
     /// Stated standard deviation of a body's orientation about each axis, deg.
     #[serde(default)]
     pub body_sigma_deg: Option<f64>,
-    /// Stated standard deviation of a marker along the line of sight, mm, of a tracker that knows depth less well; `marker_sigma_mm` is then that across it.
+    /// Stated standard deviation of a marker along the line of sight from the tracker's origin, mm, if it differs from that across it, which `marker_sigma_mm` then states.
     #[serde(default)]
     pub marker_sight_sigma_mm: Option<f64>,
-    /// Stated standard deviation of a body's position along the line of sight, mm, as of a single camera; `body_sigma_mm` is then that across it.
+    /// Stated standard deviation of a body's position along the line of sight, mm, if it differs from that across it (single camera), which `body_sigma_mm` then states.
     #[serde(default)]
     pub body_sight_sigma_mm: Option<f64>,
-    /// Stated standard deviation of a body's rotation about the line of sight, deg; `body_sigma_deg` is then that about the axes across it.
+    /// Stated standard deviation of a body's rotation about the line of sight, deg, if it differs from that about the axes across it, which `body_sigma_deg` then states.
     #[serde(default)]
     pub body_sight_sigma_deg: Option<f64>,
     /// The axis of the tracker's world frame along which the robot's root frame has its z: `+Z` for a robot that stands

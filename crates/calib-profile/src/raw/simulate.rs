@@ -70,11 +70,11 @@ pub struct RawSimNoise {
     pub body_mm: f64,
     /// A body's orientation about each axis, deg.
     pub body_deg: f64,
-    /// A marker along the line of sight, mm, where that differs; `marker_mm` is then across it.
+    /// One marker coordinate along the line of sight, mm; `marker_mm` is then the noise across it.
     pub marker_sight_mm: Option<f64>,
-    /// A body's position along the line of sight, mm, where that differs; `body_mm` is then across it.
+    /// A body's position along the line of sight, mm; `body_mm` is then the noise across it.
     pub body_sight_mm: Option<f64>,
-    /// A body's rotation about the line of sight, deg, where that differs; `body_deg` is then about the axes across it.
+    /// A body's rotation about the line of sight, deg; `body_deg` is then the noise about the axes across it.
     pub body_sight_deg: Option<f64>,
     /// A joint's true angle about its indicated one, pose to pose, deg.
     pub joint_deg: f64,

@@ -152,6 +152,16 @@ impl MeasurementKind {
 }
 
 impl MeasurementKind {
+    /// How the noise differs along the line of sight; `None` where it does not.
+    #[must_use]
+    pub fn sight(&self) -> Option<Sight> {
+        match self {
+            Self::Markers(markers) => markers.sight,
+            Self::Poses(poses) => poses.sight,
+            _ => None,
+        }
+    }
+
     /// Three rows of an observation's residual in the axes in which equations (1) to (8) state them.
     pub(crate) fn stated(&self, item: usize, rows: &[f64]) -> Vector3<f64> {
         let three = Vector3::new(rows[0], rows[1], rows[2]);

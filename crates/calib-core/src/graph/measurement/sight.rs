@@ -1,4 +1,4 @@
-//! Noise along the line of sight: a camera, or a few on one side, know the depth of what they see several times worse than its place across.
+//! Noise along the line of sight: a camera, or several on one side, measure depth less precisely than the directions across the line.
 //!
 //! With d the distance of what is seen from the origin of the instrument's frame, u the direction of that line in axes of the rows, and d₀ the distance
 //! at which the levels are stated:

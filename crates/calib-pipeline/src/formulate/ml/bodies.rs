@@ -28,6 +28,7 @@ pub(crate) const MARKER_ALONG_SIGHT: &str = "marker along sight";
 pub(crate) const BODY_ALONG_SIGHT: &str = "body position along sight";
 /// Name of the noise of bodies' rotations about the line of sight.
 pub(crate) const BODY_ABOUT_SIGHT: &str = "body orientation about sight";
+
 pub(super) fn add_bodies(
     formulation: &mut Formulation,
     inputs: &Inputs,
