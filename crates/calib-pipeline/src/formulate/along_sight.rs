@@ -162,14 +162,14 @@ fn of_sight(fit: &MlFit) -> Vec<OfSight<'_>> {
     of.collect()
 }
 
-/// What the noise along the line of sight was found to be, where the profile does not state it so.
+/// What the noise along the line of sight was found to be, where the profile does not state it.
 pub(crate) fn findings(inputs: &Inputs, fit: &MlFit) -> Vec<Finding> {
     let mut said: Vec<(GroupId, Finding)> = Vec::new();
     for of in of_sight(fit) {
         let sight = of.sight;
-        let as_stated = stated_sights(&inputs.robot.profile).contains_key(of.body)
-            && sight.growth == Growth::default();
-        if as_stated || said.iter().any(|(along, _)| *along == sight.along) {
+        // What was found is compared with what is stated; that it grows asks for nothing more.
+        let is_stated = stated_sights(&inputs.robot.profile).contains_key(of.body);
+        if is_stated || said.iter().any(|(along, _)| *along == sight.along) {
             continue;
         }
         let finding = |kind| {
