@@ -197,6 +197,15 @@ fn a_split_gives_the_body_two_mounts() {
         "{:#}",
         report["findings"]
     );
+    // `calib check` follows the profile, and counts the markers as they are.
+    let checked = dir.calib(["check", PROFILE]);
+    assert_eq!(checked.code, 0, "{}{}", checked.stdout, checked.stderr);
+    let words = checked.words();
+    assert!(!words.contains("changed-while-recording"), "{words}");
+    assert!(
+        words.contains("12 markers, 4 of 480 samples lost"),
+        "{words}"
+    );
     // Both mounts are in the scene.
     let scene = dir.read("out/ripley.scene.json");
     assert!(scene.contains("gripM_before"), "{scene}");

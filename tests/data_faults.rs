@@ -492,3 +492,108 @@ fn recall_and_false_alarms_of_the_checks_against_the_model() {
     assert!(named * 100 >= made * 99, "{named} of {made}");
     assert!(alarms == 0, "{alarms} of 50");
 }
+
+/// One file under two names: each measurement counts once, and everything but the warning is what it is without the copy.
+#[test]
+fn a_recording_that_is_listed_twice_counts_once() {
+    let dir = ripley();
+    let copy = "recordings:\n  again: {file: ripley/arm_poses.csv, use: static}\n";
+    let twice = dir.read(PROFILE).replacen("recordings:\n", copy, 1);
+    let dir = dir.file("robots/twice.yaml", twice);
+    let once = dir.calib(["run", PROFILE, "--out", "once"]);
+    assert_eq!(once.code, 0, "{}", once.stderr);
+    let found = findings(&dir, "robots/twice.yaml");
+    assert_eq!(found.len(), 1, "{found:#?}");
+    let named = &found[0];
+    assert_eq!(
+        (&named["id"], &named["severity"]),
+        (&"rows-repeated".into(), &"warning".into())
+    );
+    let text = named.to_string();
+    assert!(
+        text.contains("again") && text.contains("arm_poses"),
+        "{text}"
+    );
+    let ran = dir.calib(["run", "robots/twice.yaml", "--out", "twice"]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(
+        ran.words().contains("ACCEPTED WITH 1 WARNING"),
+        "{}",
+        ran.stdout
+    );
+    let sigmas = |out: &str| -> Vec<f64> {
+        let report = dir.json(&format!("{out}/report.json"));
+        let all = report["parameters"].as_array().expect("a list").clone();
+        all.iter().filter_map(|p| p["sigma"].as_f64()).collect()
+    };
+    let (once, twice) = (sigmas("once"), sigmas("twice"));
+    assert!(once.len() > 50 && once.len() == twice.len());
+    for (a, b) in once.iter().zip(&twice) {
+        assert!((a - b).abs() < 1e-6 * a.abs(), "{a} {b}");
+    }
+}
+
+/// A table that was pasted below itself.
+#[test]
+fn rows_that_were_pasted_twice_count_once() {
+    let dir = ripley();
+    let table = "robots/ripley/arm_poses.csv";
+    let text = dir.read(table);
+    let rows: Vec<&str> = text.lines().filter(|line| !line.starts_with('#')).collect();
+    let dir = dir.file(table, format!("{text}{}\n", rows[1..21].join("\n")));
+    let found = findings(&dir, PROFILE);
+    let named: Vec<&Value> = found
+        .iter()
+        .filter(|f| f["id"] == "rows-repeated")
+        .collect();
+    assert_eq!(named.len(), 1, "{found:#?}");
+    assert!(named[0].to_string().contains("20 of"), "{named:?}");
+    let ran = dir.calib(["run", PROFILE, "--out", "out"]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert!(
+        ran.words().contains("copies of the same measurements"),
+        "{}",
+        ran.stdout
+    );
+}
+
+/// In every fourth row a marker is its mirror image in a window behind the robot: the distances prove it, and the fit never sees it. Taken for errors of an
+/// incomplete model, such rows were readmitted, and the result was 289 mm off.
+#[test]
+fn reflections_in_a_quarter_of_the_rows_are_left_out() {
+    let tables = ["robots/ripley/arm_poses.csv", "robots/ripley/checks.csv"];
+    let dir = tables.iter().fold(ripley(), |dir, table| {
+        dir.cells(table, |row, name, cell| {
+            let mirrored = name == "gripM_3.y_m" && row % 4 == 1;
+            match cell.parse::<f64>() {
+                Ok(y) if mirrored => (2.6 - y).to_string(),
+                _ => cell.to_owned(),
+            }
+        })
+    });
+    let ran = dir.calib(["run", PROFILE, "--out", "out"]);
+    assert_eq!(ran.code, 0, "{}{}", ran.stdout, ran.stderr);
+    let report = dir.json("out/report.json");
+    let rejected = report["rejected"].as_array().expect("a list");
+    let ghosts = rejected.iter().filter(|r| r["cause"] == "out_of_place");
+    let ghosts: Vec<&Value> = ghosts.collect();
+    assert!(!ghosts.is_empty(), "{rejected:#?}");
+    assert!(
+        ghosts.iter().all(|r| r["subject"] == "gripM_3"),
+        "{ghosts:#?}"
+    );
+    let rows = |name: &str| ghosts.iter().any(|r| r["recording"] == name);
+    assert!(rows("arm_poses") && rows("checks"), "{ghosts:#?}");
+    let names: Vec<&str> = report["findings"]
+        .as_array()
+        .expect("a list")
+        .iter()
+        .filter_map(|f| f["id"].as_str())
+        .collect();
+    assert!(names.contains(&"marker-outlier"), "{names:?}");
+    let held_out = &report["verification"]["held_out"]["calibrated"]["rms_m"];
+    assert!(
+        held_out.as_f64().is_some_and(|rms| rms < 8e-4),
+        "{held_out}"
+    );
+}

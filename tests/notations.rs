@@ -85,8 +85,24 @@ fn scalar_first(pose: &Isometry3<f64>) -> Vec<f64> {
     vec![coords.w, coords.x, coords.y, coords.z]
 }
 
+/// A matrix, column by column as it is stored.
+fn columns(pose: &Isometry3<f64>) -> Vec<f64> {
+    let matrix = pose.rotation.to_rotation_matrix();
+    matrix.matrix().iter().copied().collect()
+}
+
+fn rows(pose: &Isometry3<f64>) -> Vec<f64> {
+    let matrix = pose.rotation.to_rotation_matrix().transpose();
+    matrix.matrix().iter().copied().collect()
+}
+
+fn about_axis(pose: &Isometry3<f64>) -> [f64; 4] {
+    let (axis, angle) = pose.rotation.axis_angle().expect("turned");
+    [axis.x, axis.y, axis.z, angle]
+}
+
 /// What cameras, controllers and loggers write.
-const WAYS: [Way; 18] = [
+const WAYS: [Way; 27] = [
     Way {
         names: "T_x,T_y,T_z,R_x,R_y,R_z",
         numbers: |p| with(place(p, 1.0), vector(p)),
@@ -180,6 +196,54 @@ const WAYS: [Way; 18] = [
         numbers: |p| with(place(p, 1.0), scalar_last(p)),
         map: "quaternion_xyzw: [field.transform.rotation.x, field.transform.rotation.y, field.transform.rotation.z, field.transform.rotation.w]",
     },
+    Way {
+        names: "x,y,z,r11,r12,r13,r21,r22,r23,r31,r32,r33",
+        numbers: |p| with(place(p, 1.0), rows(p)),
+        map: "rotation_matrix: [r11, r12, r13, r21, r22, r23, r31, r32, r33]",
+    },
+    Way {
+        names: "hand_x_mm,hand_y_mm,hand_z_mm,hand_R_0_0,hand_R_0_1,hand_R_0_2,hand_R_1_0,hand_R_1_1,hand_R_1_2,hand_R_2_0,hand_R_2_1,hand_R_2_2",
+        numbers: |p| with(place(p, 1e3), columns(p)),
+        map: "rotation_matrix: [hand_R_0_0, hand_R_1_0, hand_R_2_0, hand_R_0_1,",
+    },
+    Way {
+        names: "T00,T01,T02,T03,T10,T11,T12,T13,T20,T21,T22,T23,T30,T31,T32,T33",
+        numbers: |p| p.to_homogeneous().transpose().iter().copied().collect(),
+        map: "{position: [T03, T13, T23], rotation_matrix: [T00, T01, T02, T10, T11, T12, T20, T21, T22]}",
+    },
+    Way {
+        names: "cam_pose_0,cam_pose_1,cam_pose_2,cam_pose_3,cam_pose_4,cam_pose_5,cam_pose_6,cam_pose_7,cam_pose_8,cam_pose_9,cam_pose_10,cam_pose_11,cam_pose_12,cam_pose_13,cam_pose_14,cam_pose_15",
+        numbers: |p| p.to_homogeneous().iter().copied().collect(),
+        map: "cam: {position: [cam_pose_12, cam_pose_13, cam_pose_14], rotation_matrix: [cam_pose_0, cam_pose_4, cam_pose_8,",
+    },
+    Way {
+        names: "tx,ty,tz,r1,r2,r3,r4,r5,r6,r7,r8,r9",
+        numbers: |p| with(place(p, 1e3), rows(p)),
+        map: "rotation_matrix: [r1, r2, r3, r4, r5, r6, r7, r8, r9]",
+    },
+    Way {
+        names: "nx,ny,nz,ox,oy,oz,ax,ay,az,px,py,pz",
+        numbers: |p| with(columns(p), place(p, 1e3)),
+        map: "rotation_matrix: [nx, ox, ax, ny, oy, ay, nz, oz, az]",
+    },
+    Way {
+        names: "x,y,z,rxx,rxy,rxz,ryx,ryy,ryz,rzx,rzy,rzz",
+        numbers: |p| with(place(p, 1.0), rows(p)),
+        map: "rotation_matrix: [rxx, rxy, rxz, ryx, ryy, ryz, rzx, rzy, rzz]",
+    },
+    Way {
+        names: "x,y,z,axis_x,axis_y,axis_z,angle",
+        numbers: |p| with(place(p, 1.0), about_axis(p)),
+        map: "axis_angle: [axis_x, axis_y, axis_z, angle]",
+    },
+    Way {
+        names: "hand.x,hand.y,hand.z,hand.ux,hand.uy,hand.uz,hand.theta_deg",
+        numbers: |p| {
+            let [x, y, z, angle] = about_axis(p);
+            with(place(p, 1.0), [x, y, z, angle.to_degrees()])
+        },
+        map: "axis_angle: [hand.ux, hand.uy, hand.uz, hand.theta_deg]",
+    },
 ];
 
 /// Postures of the arm in degrees, and the pose of a body on its last link that a tracker saw.
@@ -229,7 +293,7 @@ fn table(way: &Way, rows: &[(Vec<f64>, Isometry3<f64>)]) -> String {
     text
 }
 
-/// 18 notations, each with random postures and with one joint at a time: all are read as they were written, nothing is left to a guess, and the
+/// 27 notations, each with random postures and with one joint at a time: all are read as they were written, nothing is left to a guess, and the
 /// calibrated robot is as good with each.
 #[test]
 fn orientations_are_read_in_the_notation_that_bodies_follow_the_robot_with() {

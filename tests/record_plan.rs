@@ -49,9 +49,13 @@ simulate:
 
 /// The arm with a plan of so many postures.
 fn planned(poses: &str) -> Scratch {
+    planned_for(URDF, PROFILE, poses)
+}
+
+fn planned_for(urdf: &str, profile: &str, poses: &str) -> Scratch {
     let dir = Scratch::new()
-        .file("arm.urdf", URDF)
-        .file("arm.yaml", PROFILE);
+        .file("arm.urdf", urdf)
+        .file("arm.yaml", profile);
     let ran = dir.calib([
         "plan",
         "arm.yaml",
@@ -139,7 +143,7 @@ impl Cell {
             q[model.joint_id(name).expect("a joint").index()] = value.to_radians();
         }
         let simulated = self.robot.profile.simulate.as_ref().expect("a section");
-        let link = model.link_id("l4").expect("a link");
+        let link = self.robot.profile.bodies["hand"].link;
         let hand: Isometry3<f64> = simulated.tracker_from_root
             * model.root_from_link(&q, link)
             * simulated.mounts["hand"].link_from_body;
@@ -278,6 +282,33 @@ fn a_plan_is_followed_to_its_end() {
     let poses = ran.stdout.split("static poses, ").nth(1);
     let poses = poses.and_then(|rest| rest.split(' ').next()?.parse().ok());
     assert!(poses.is_some_and(|n: usize| n > 12), "{}", ran.stdout);
+}
+
+/// An arm of seven joints, of which a grid would have 280 000 postures: the plan has its own.
+#[test]
+fn a_plan_of_seven_joints_is_followed() {
+    let more: String = (5..8)
+        .map(|k| {
+            let axis = if k == 6 { "1 0 0" } else { "0 1 0" };
+            format!(
+                r#"<link name="l{k}"/><joint name="j{k}" type="revolute"><parent link="l{}"/><child link="l{k}"/><origin xyz="0.15 0 0.02"/><axis xyz="{axis}"/>
+<limit lower="-1.5" upper="1.5" effort="9" velocity="2"/></joint>"#,
+                k - 1
+            )
+        })
+        .collect();
+    let urdf = URDF.replace("</robot>", &format!("{more}</robot>"));
+    let profile = PROFILE.replace("link: l4", "link: l7");
+    let dir = planned_for(&urdf, &profile, "12");
+    let mut cell = Cell::new(&dir, "poses", true, 100, &[]);
+    cell.follows(2);
+    cell.presses("q");
+    let (code, said) = cell.ends();
+    assert_eq!(code, Some(0), "{said}");
+    let parts = ["12 postures of plan/plan.yaml to record", "pose 1/12: j1 "];
+    for part in parts {
+        assert!(said.contains(part), "{part}: {said}");
+    }
 }
 
 /// A person who presses Enter: skips, is interrupted, goes on where the file ends, and stops at the asked σ.

@@ -92,6 +92,65 @@ fn hand_eye(spoil: impl Fn([f64; 7]) -> [f64; 7]) -> Scratch {
     Scratch::new().file("pairs.csv", table)
 }
 
+/// The flange as a matrix and the board as a rotation vector give what quaternions give.
+#[test]
+fn hand_and_eye_are_read_in_other_notations() {
+    let quaternions = hand_eye(|p| p);
+    let text = quaternions.read("pairs.csv");
+    let entries = (0..9).map(|k| format!("flange_r{}{}", k / 3 + 1, k % 3 + 1));
+    let entries: Vec<String> = entries.collect();
+    let mut table = format!(
+        "flange_x,flange_y,flange_z,{},meas_x,meas_y,meas_z,meas_rvec_x,meas_rvec_y,meas_rvec_z\n",
+        entries.join(",")
+    );
+    for row in text.lines().skip(1) {
+        let cells: Vec<f64> = row
+            .split(',')
+            .map(|c| c.parse().expect("a number"))
+            .collect();
+        let turned = |q: &[f64]| {
+            nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(
+                q[3], q[0], q[1], q[2],
+            ))
+        };
+        let (a, b) = (turned(&cells[3..7]), turned(&cells[10..14]));
+        let rows = a.to_rotation_matrix().transpose();
+        let vector = b.scaled_axis();
+        let numbers = cells[..3].iter().chain(rows.matrix().iter());
+        let numbers = numbers.chain(&cells[7..10]).copied();
+        let numbers = numbers.chain(vector.iter().copied());
+        let numbers: Vec<String> = numbers.map(|x| x.to_string()).collect();
+        table += &(numbers.join(",") + "\n");
+    }
+    let others = Scratch::new().file("pairs.csv", table);
+    let fit = |dir: &Scratch| {
+        dir.calib(["fit", "handeye", "pairs.csv", "--json"])
+            .expect(0)
+            .json()
+    };
+    let (one, other) = (fit(&quaternions), fit(&others));
+    assert_eq!(one["verdict"], other["verdict"]);
+    let numbers = |answer: &Value| -> Vec<f64> {
+        let all = answer["covariance"].as_array().expect("a matrix");
+        let rows = all.iter().flat_map(|row| row.as_array().expect("a row"));
+        rows.filter_map(Value::as_f64).collect()
+    };
+    let (one, other) = (numbers(&one), numbers(&other));
+    assert_eq!((one.len(), other.len()), (144, 144));
+    let largest = one.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+    let off = one.iter().zip(&other).map(|(a, b)| (a - b).abs());
+    assert!(off.fold(0.0, f64::max) < 1e-6 * largest);
+    // What is missing is said of the first notation.
+    let broken = Scratch::new().file("pairs.csv", text.replace("meas_qw", "meas_qv"));
+    let ran = broken.calib(["fit", "handeye", "pairs.csv"]);
+    assert_eq!(ran.code, 3, "{}", ran.stderr);
+    let words = ran.stderr.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        words.contains("meas_qw") && words.contains("_rvec_x"),
+        "{words}"
+    );
+}
+
 #[test]
 fn hand_and_eye_are_judged() {
     let fit = |dir: &Scratch, code: i32| {

@@ -35,4 +35,7 @@ mod statistics;
 pub mod structural;
 pub mod sync;
 
-pub use recording::{Expectations, checks, held_out_in_training, other_scales, other_shapes};
+pub use recording::{
+    Copied, Expectations, checks, copied_rows, held_out_in_training, other_scales, other_shapes,
+    out_of_place, repeated_rows,
+};

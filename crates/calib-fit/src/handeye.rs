@@ -6,7 +6,7 @@ use std::fmt::Write as _;
 
 use calib_estimator::{Input, Kind, Options, Verdict};
 use calib_handeye::{Correction, HandEye, Residuals, explained_as_written};
-use calib_recording::{BodyColumns, ColumnMap, Problem, ReadOptions};
+use calib_recording::{BodyColumns, ColumnMap, Poses, Problem, ReadOptions};
 use calib_urdf::rpy::{rotation_from_rpy, rpy_from_rotation};
 use nalgebra::{Isometry3, Matrix3, Translation3, Vector3};
 use serde_json::{Value, json};
@@ -105,40 +105,25 @@ struct PosePairs {
 /// The rows in which both poses are known.
 fn pose_pairs(table: &Measured, robot: &str, measured: &str) -> Result<PosePairs, FitError> {
     let file = table.name();
-    let columns = |prefix: &str| BodyColumns {
-        position: ["x", "y", "z"].map(|a| format!("{prefix}_{a}")),
-        quaternion_xyzw: Some(["qx", "qy", "qz", "qw"].map(|a| format!("{prefix}_{a}"))),
-        ..BodyColumns::default()
-    };
-    let map = ColumnMap {
-        bodies: [
-            (robot.to_owned(), columns(robot)),
-            (measured.to_owned(), columns(measured)),
-        ]
-        .into(),
-        ..ColumnMap::default()
-    };
     let own = table
         .poses(&ReadOptions::default())
         .ok()
         .filter(|p| p.bodies.contains_key(robot) && p.bodies.contains_key(measured));
     let poses = match own {
         Some(poses) => poses,
-        None => {
-            let options = ReadOptions {
-                columns: Some(map),
-                ..ReadOptions::default()
-            };
-            table.poses(&options).map_err(|error| match error {
-                // Nothing of the columns is known of a file that is not there.
-                FitError::Recording(unread) if matches!(*unread.problem, Problem::Io(_)) => unread.into(),
-                error => FitError::Data {
-                    file: file.display().to_string(),
-                    finding: format!("does not hold two poses per row, `{robot}` and `{measured}`: {error}"),
-                    remedy: "name the columns <prefix>_x, _y, _z, _qx, _qy, _qz, _qw and give the prefixes with --robot and --measured".to_owned(),
-                },
-            })?
-        }
+        None => read_by_names(table, robot, measured).map_err(|error| match error {
+            // Nothing of the columns is known of a file that is not there.
+            FitError::Recording(unread) if matches!(*unread.problem, Problem::Io(_)) => {
+                unread.into()
+            }
+            error => FitError::Data {
+                file: file.display().to_string(),
+                finding: format!(
+                    "does not hold two poses per row, `{robot}` and `{measured}`: {error}"
+                ),
+                remedy: "name the columns <prefix>_x, _y, _z and _qx, _qy, _qz, _qw (a quaternion), _rvec_x, _rvec_y, _rvec_z (axis times angle, rad) or _r11, _r12 … _r33 (a matrix), and give the prefixes with --robot and --measured".to_owned(),
+            },
+        })?,
     };
     let both = poses.bodies[robot].iter().zip(&poses.bodies[measured]);
     let mut pairs = PosePairs {
@@ -167,6 +152,61 @@ fn pose_pairs(table: &Measured, robot: &str, measured: &str) -> Result<PosePairs
         }
     }
     Ok(pairs)
+}
+
+/// The columns of a pose by its prefix, in each notation of the rotation.
+fn by_prefix(prefix: &str) -> [BodyColumns; 3] {
+    let named = |of: &str| format!("{prefix}_{of}");
+    let position = ["x", "y", "z"].map(named);
+    let turned = |body: BodyColumns| BodyColumns {
+        position: position.clone(),
+        ..body
+    };
+    let entry = |k: usize| named(&format!("r{}{}", k / 3 + 1, k % 3 + 1));
+    [
+        turned(BodyColumns {
+            quaternion_xyzw: Some(["qx", "qy", "qz", "qw"].map(named)),
+            ..BodyColumns::default()
+        }),
+        turned(BodyColumns {
+            rotation_vector: Some(["rvec_x", "rvec_y", "rvec_z"].map(named)),
+            ..BodyColumns::default()
+        }),
+        turned(BodyColumns {
+            rotation_matrix: Some(std::array::from_fn(entry)),
+            ..BodyColumns::default()
+        }),
+    ]
+}
+
+/// The poses in the notations that the table has; without one of them, what is missing of the first.
+fn read_by_names(table: &Measured, robot: &str, measured: &str) -> Result<Poses, FitError> {
+    let mut missing = None;
+    for of_robot in by_prefix(robot) {
+        for of_measured in by_prefix(measured) {
+            let bodies = [
+                (robot.to_owned(), of_robot.clone()),
+                (measured.to_owned(), of_measured),
+            ];
+            let options = ReadOptions {
+                columns: Some(ColumnMap {
+                    bodies: bodies.into(),
+                    ..ColumnMap::default()
+                }),
+                ..ReadOptions::default()
+            };
+            match table.poses(&options) {
+                Err(FitError::Recording(e))
+                    if matches!(*e.problem, Problem::MissingColumn { .. }) =>
+                {
+                    missing.get_or_insert(e);
+                }
+                read => return read,
+            }
+        }
+    }
+    // There is a notation, so that something was missing.
+    missing.map_or_else(|| table.poses(&ReadOptions::default()), |e| Err(e.into()))
 }
 
 /// `rows`: of the poses, in the file.

@@ -55,7 +55,11 @@ fn swap(columns: &mut BodyColumns, mistake: PoseMistake) -> Option<()> {
             columns.quaternion_xyzw = Some(columns.quaternion_wxyz.take()?);
         }
         PoseMistake::Inverse => columns.inverted = !columns.inverted,
-        PoseMistake::Transposed => return None,
+        // The file writes the matrix column by column.
+        PoseMistake::Transposed => {
+            let [a, b, c, d, e, f, g, h, i] = columns.rotation_matrix.take()?;
+            columns.rotation_matrix = Some([a, d, g, b, e, h, c, f, i]);
+        }
     }
     Some(())
 }

@@ -23,6 +23,7 @@ pub mod labels;
 pub mod limits;
 pub mod links;
 pub mod located;
+mod matrix;
 mod mirror;
 pub mod mistake;
 pub mod name;

@@ -114,7 +114,7 @@ impl Part {
 }
 
 /// The name of one thing: the words of a column before those of a position or an orientation, and without fillers.
-fn of_words(stem: &str, words: &[String], behind: &str) -> String {
+pub(crate) fn of_words(stem: &str, words: &[String], behind: &str) -> String {
     let is_kind = |word: &String| {
         let kinds = [&PLACES[..], &TURNS, &ANGLES, &VECTORS, &FILLERS];
         kinds.iter().any(|kind| kind.contains(&word.as_str()))

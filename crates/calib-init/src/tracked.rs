@@ -1,6 +1,6 @@
 //! Columns of what a tracker sees: positions in threes, and the orientations beside them in the notations that are in use.
 //!
-//! A quaternion is known by its letters or its length. Three angles are known as such by their names, which do not say in which order the rotations
+//! A quaternion is known by its letters or its length, a [matrix](crate::matrix) by its names and numbers. Three angles are known as such by their names, which do not say in which order the rotations
 //! follow each other, or whether they are a rotation vector: the usual way for such names is taken, and the others are kept for the motion to decide
 //! ([`turns`](crate::turns)).
 
@@ -11,6 +11,7 @@ use calib_recording::{AngleUnit, BodyColumns, EulerAxes, EulerColumns};
 use crate::fact::{About, Notation, TurnsHow};
 use crate::guess::{Guess, TURN};
 use crate::header::Header;
+use crate::matrix::{self, Stated};
 use crate::name::{self, NamedUnit};
 use crate::parts::{self, Part, Set};
 
@@ -30,6 +31,9 @@ pub(crate) fn tracked(
     let (mut places, mut turns) = (Groups::new(), Groups::new());
     let free = |i: &usize| !used.contains(i) && !joints.contains(i) && header.has_numbers(*i);
     let mut free: Vec<usize> = (0..header.names.len()).filter(free).collect();
+    let stated = matrix::stated(header, &free);
+    let matrices = matrix::columns(&stated);
+    free.retain(|i| !matrices.contains(i));
     // `x` belongs to `qx`, and `X` beside it to something else.
     free.sort_by_key(|i| header.names[*i].contains(char::is_uppercase));
     for &i in &free {
@@ -77,7 +81,7 @@ pub(crate) fn tracked(
     let letters: Vec<String> = named.keys().map(|name| name.to_lowercase()).collect();
     let pairs = [["r", "t"], ["p", "r"], ["p", "q"], ["q", "t"]];
     let single = pairs.iter().any(|pair| letters == *pair);
-    other_notations(header, guess, used, (&free, single));
+    other_notations(header, guess, used, (&free, single), stated);
     let has_bodies = !guess.map.bodies.is_empty();
     let column = |position: &[usize; 3]| header.names[position[0]].as_str();
     let quantity = |position: &[usize; 3]| {
@@ -111,6 +115,7 @@ fn other_notations(
     guess: &mut Guess,
     used: &mut BTreeSet<usize>,
     (free, single): (&[usize], bool),
+    mut stated: BTreeMap<String, Stated>,
 ) {
     let mut places: BTreeMap<String, BTreeMap<usize, usize>> = BTreeMap::new();
     let mut turns: BTreeMap<String, BTreeMap<Set, BTreeMap<usize, usize>>> = BTreeMap::new();
@@ -150,15 +155,20 @@ fn other_notations(
             .or_insert(i);
         }
     }
+    for (of, matrix) in &stated {
+        if let Some(place) = matrix.place {
+            places.insert(of.clone(), place.into_iter().enumerate().collect());
+        }
+    }
     for (of, place) in places {
         let Some(place) = in_order::<3>(&place) else {
             continue;
         };
-        let Some(sets) = turns.get(&of) else {
-            continue;
-        };
         let is_free = |columns: &[usize]| columns.iter().all(|i| !used.contains(i));
-        let orientation = orientation(header, sets);
+        let orientation = match stated.remove(&of) {
+            Some(matrix) => Some((matrix.used, matrix.ways)),
+            None => turns.get(&of).and_then(|sets| orientation(header, sets)),
+        };
         let Some((columns, mut ways)) = orientation.filter(|(columns, _)| is_free(columns)) else {
             continue;
         };
@@ -334,7 +344,7 @@ pub(crate) fn unit_of_turns(header: &Header, guess: &mut Guess) {
         };
         let of: Vec<usize> = names.iter().filter_map(|n| header.position(n)).collect();
         let mut unit = None;
-        if !matches!(notation, Notation::Quaternion { .. }) {
+        if notation.has_angles() {
             let (_, angle) = unit_of(header, &of);
             if angle != guess.map.angles {
                 guess.map.body_angles = Some(angle);

@@ -103,7 +103,7 @@ pub(crate) fn by_motion(
                 About::Turns {
                     columns: names,
                     notation,
-                    unit: Some(map.body_angles.unwrap_or(map.angles)),
+                    unit: (notation.has_angles()).then(|| map.body_angles.unwrap_or(map.angles)),
                     how: ways[body].1,
                 },
             );

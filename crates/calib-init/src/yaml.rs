@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 
 use calib_profile::edit::Value;
-use calib_recording::{AngleUnit, BodyColumns, ColumnMap, Delimiter, LengthUnit};
+use calib_recording::{AngleUnit, BodyColumns, ColumnMap, Delimiter, LengthUnit, RotationColumns};
 
 /// A text, quoted where YAML would read something else.
 #[must_use]
@@ -128,32 +128,21 @@ pub fn columns(columns: &ColumnMap) -> Vec<(String, Value)> {
 }
 
 fn body(name: &str, body: &BodyColumns) -> String {
-    let orders = [
-        ("quaternion_xyzw", &body.quaternion_xyzw),
-        ("quaternion_wxyz", &body.quaternion_wxyz),
-    ];
-    let turn = orders.map(|(key, columns)| {
-        let columns = columns.as_ref().map(list);
-        columns.map_or_else(String::new, |columns| format!(", {key}: {columns}"))
-    });
-    let angles = [
-        ("rotation_vector", &body.rotation_vector),
-        ("fixed_xyz", &body.fixed_xyz),
-    ];
-    let angles = angles.map(|(key, columns)| {
-        let columns = columns.as_ref().map(list);
-        columns.map_or_else(String::new, |columns| format!(", {key}: {columns}"))
-    });
-    let euler = body.euler.as_ref().map_or_else(String::new, |euler| {
-        let (axes, columns) = (euler.axes.name(), list(&euler.columns));
-        format!(", euler: {{axes: {axes}, columns: {columns}}}")
+    let turns = body.rotations().map(|of| {
+        let columns = list(of.columns());
+        match of {
+            RotationColumns::Euler(axes, _) => {
+                format!(", euler: {{axes: {}, columns: {columns}}}", axes.name())
+            }
+            of => format!(", {}: {columns}", of.keys().join(".")),
+        }
     });
     let inverted = if body.inverted {
         ", inverted: true"
     } else {
         ""
     };
-    let turn = turn.into_iter().chain(angles).collect::<String>() + &euler + inverted;
+    let turn = turns.collect::<String>() + inverted;
     format!(
         "{}: {{position: {}{turn}}}",
         text(name),

@@ -6,7 +6,7 @@ use std::path::Path;
 use calib_core::Settings;
 use calib_finding::{Fact, Finding, Severity, Subject, catalog};
 use calib_geometry::statistics::median;
-use calib_profile::{BodyKind, Method, Usage};
+use calib_profile::{Body, BodyKind, Method, Usage};
 use calib_report::{BodyNoise, CheckOutcome, Checked, CheckedRecording, DataCheck, DataChecks};
 
 use crate::error::{ExitCode, PipelineError};
@@ -24,12 +24,14 @@ use crate::prepare::aligned::Alignment;
 use crate::prepare::checks;
 use crate::prepare::condensed::condense;
 use crate::prepare::effects;
+use crate::prepare::ghosts;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::load::load_recordings;
 use crate::prepare::named;
 use crate::prepare::relabel::relabel;
 use crate::prepare::repeats;
 use crate::prepare::robot::load_robot;
+use crate::prepare::split::split;
 use crate::prepare::tracks::{BodyTrack, body_tracks};
 use crate::verify::causes::causes;
 
@@ -50,8 +52,19 @@ pub fn check(profile: &Path, plugins: Plugins) -> Result<DataChecks, PipelineErr
     let is_wrong = |f: &Finding| f.severity == Severity::Error && f.id != catalog::DUPLICATE_COLUMN;
     let wrong = of_data.iter().any(is_wrong);
     findings.extend(of_data);
+    if inputs.robot.profile.solve.robust {
+        ghosts::take_out(&mut inputs, &findings);
+    }
     let mut noise = Vec::new();
     let mut moved = false;
+    // What was recorded is said of bodies as they are, whatever a `split` makes of them.
+    let is_split = |body: &Body| body.split.is_some();
+    let shown = (inputs.robot.profile.bodies.values().any(is_split)).then(|| {
+        let mut whole = inputs.clone();
+        condense(&mut whole);
+        whole
+    });
+    split(&mut inputs);
     findings.extend(condense(&mut inputs));
     match body_tracks(&inputs, &mut findings) {
         Ok(tracks) => {
@@ -88,7 +101,7 @@ pub fn check(profile: &Path, plugins: Plugins) -> Result<DataChecks, PipelineErr
     findings.sort_by_key(|f| std::cmp::Reverse(f.severity));
     Ok(DataChecks {
         robot: inputs.robot.profile.robot.clone(),
-        recordings: recordings(&inputs),
+        recordings: recordings(shown.as_ref().unwrap_or(&inputs)),
         coverage: coverage(&inputs),
         noise,
         checks: checks_of(&inputs, &findings, moved),

@@ -5,6 +5,7 @@ use crate::units::{AngleUnit, LengthUnit, TimeUnit};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
 
 /// Meaning of the columns of a delimited table whose header does not follow our own rules.
 ///
@@ -26,9 +27,9 @@ pub struct ColumnMap {
     pub names: Vec<String>,
     /// Numbers are written `1,5`.
     pub decimal_comma: bool,
-    /// Unit of joint angles, rotation vectors and Euler angles in the mapped columns; a name that ends in `_deg` says it itself.
+    /// Unit of joint angles, rotation vectors, Euler angles and angles about an axis in the mapped columns; a name that ends in `_deg` says it itself.
     pub angles: AngleUnit,
-    /// Unit of rotation vectors and Euler angles of bodies, where it is another one than that of the joints.
+    /// Unit of rotation vectors, Euler angles and angles about an axis of bodies, where it is another one than that of the joints.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub body_angles: Option<AngleUnit>,
     /// Unit of positions and prismatic joints in the mapped columns; a name that ends in `_mm` says it itself.
@@ -119,22 +120,107 @@ pub struct BodyColumns {
     /// Columns of angles about axes that turn with the body, and which axes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub euler: Option<EulerColumns>,
+    /// Columns of a rotation matrix, row by row: the body's axes in the tracker's frame are its columns.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rotation_matrix: Option<[String; 9]>,
+    /// Columns of the x, y and z of an axis of length 1, and of the angle about it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub axis_angle: Option<[String; 4]>,
     /// The columns hold the pose of the tracker in the body, as the software of a camera on the robot states where a board is: the inverse is used.
     /// The tracker's noise is that of the pose as it was measured, so of the board in the camera.
     #[serde(skip_serializing_if = "is_false")]
     pub inverted: bool,
 }
 
+/// A rotation of a body in the notation of its columns, these in the order of the map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum RotationColumns<'a> {
+    /// A quaternion, scalar last.
+    QuaternionXyzw(&'a [String; 4]),
+    /// A quaternion, scalar first.
+    QuaternionWxyz(&'a [String; 4]),
+    /// Axis times angle.
+    RotationVector(&'a [String; 3]),
+    /// Angles about fixed x, y, z.
+    FixedXyz(&'a [String; 3]),
+    /// Angles about axes that turn with the body.
+    Euler(EulerAxes, &'a [String; 3]),
+    /// A matrix, row by row.
+    Matrix(&'a [String; 9]),
+    /// x, y, z of the axis, and the angle.
+    AxisAngle(&'a [String; 4]),
+}
+
+impl<'a> RotationColumns<'a> {
+    /// The columns.
+    #[must_use]
+    pub fn columns(self) -> &'a [String] {
+        match self {
+            Self::QuaternionXyzw(four) | Self::QuaternionWxyz(four) | Self::AxisAngle(four) => four,
+            Self::RotationVector(three) | Self::FixedXyz(three) | Self::Euler(_, three) => three,
+            Self::Matrix(nine) => nine,
+        }
+    }
+
+    /// Which of the columns are angles; the others have no unit.
+    #[must_use]
+    pub fn angles(self) -> Range<usize> {
+        match self {
+            Self::QuaternionXyzw(_) | Self::QuaternionWxyz(_) | Self::Matrix(_) => 0..0,
+            Self::RotationVector(_) | Self::FixedXyz(_) | Self::Euler(..) => 0..3,
+            Self::AxisAngle(_) => 3..4,
+        }
+    }
+
+    /// Keys below the body that lead to the columns.
+    #[must_use]
+    pub fn keys(self) -> &'static [&'static str] {
+        match self {
+            Self::QuaternionXyzw(_) => &["quaternion_xyzw"],
+            Self::QuaternionWxyz(_) => &["quaternion_wxyz"],
+            Self::RotationVector(_) => &["rotation_vector"],
+            Self::FixedXyz(_) => &["fixed_xyz"],
+            Self::Euler(..) => &["euler", "columns"],
+            Self::Matrix(_) => &["rotation_matrix"],
+            Self::AxisAngle(_) => &["axis_angle"],
+        }
+    }
+}
+
 impl BodyColumns {
+    /// All rotations that are given, of which there must be one.
+    pub fn rotations(&self) -> impl Iterator<Item = RotationColumns<'_>> {
+        use RotationColumns as Of;
+        let euler = self.euler.as_ref();
+        let all = [
+            self.quaternion_xyzw.as_ref().map(Of::QuaternionXyzw),
+            self.quaternion_wxyz.as_ref().map(Of::QuaternionWxyz),
+            self.rotation_vector.as_ref().map(Of::RotationVector),
+            self.fixed_xyz.as_ref().map(Of::FixedXyz),
+            euler.map(|euler| Of::Euler(euler.axes, &euler.columns)),
+            self.rotation_matrix.as_ref().map(Of::Matrix),
+            self.axis_angle.as_ref().map(Of::AxisAngle),
+        ];
+        all.into_iter().flatten()
+    }
+
     /// All columns of the body, to be renamed.
     pub fn all_mut(&mut self) -> impl Iterator<Item = &mut String> {
-        let quaternions = [&mut self.quaternion_xyzw, &mut self.quaternion_wxyz];
-        let angles = [&mut self.rotation_vector, &mut self.fixed_xyz];
-        let quaternions = quaternions.into_iter().flatten().flatten();
-        let angles = angles.into_iter().flatten().flatten();
-        let euler = self.euler.iter_mut().flat_map(|euler| &mut euler.columns);
-        let turns = quaternions.chain(angles).chain(euler);
-        self.position.iter_mut().chain(turns)
+        fn of<const N: usize>(columns: &mut Option<[String; N]>) -> &mut [String] {
+            columns.as_mut().map_or(&mut [], |columns| columns)
+        }
+        let euler = self.euler.as_mut().map(|euler| &mut euler.columns);
+        let all: [&mut [String]; 8] = [
+            &mut self.position,
+            of(&mut self.quaternion_xyzw),
+            of(&mut self.quaternion_wxyz),
+            of(&mut self.rotation_vector),
+            of(&mut self.fixed_xyz),
+            euler.map_or(&mut [], |columns| columns),
+            of(&mut self.rotation_matrix),
+            of(&mut self.axis_angle),
+        ];
+        all.into_iter().flatten()
     }
 }
 

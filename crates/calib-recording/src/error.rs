@@ -245,11 +245,13 @@ pub enum Problem {
         /// Where it was first.
         first: u64,
     },
-    /// A quaternion that is no rotation.
-    #[error("body `{body}`: the quaternion has length {norm:.6}, expected 1 within {tolerance}")]
+    /// A quaternion, or the axis of a rotation, that has not the length 1.
+    #[error("body `{body}`: the {what} has length {norm:.6}, expected 1 within {tolerance}")]
     NotUnit {
         /// The body.
         body: String,
+        /// What has a length.
+        what: &'static str,
         /// The length found.
         norm: f64,
         /// The tolerance.

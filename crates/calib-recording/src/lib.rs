@@ -37,12 +37,14 @@ mod poses;
 pub mod readers;
 mod remedy;
 mod rename;
+mod rotation;
 mod table;
 mod text;
 mod units;
 
 pub use column_map::{
-    BodyColumns, ColumnMap, Delimiter, EulerColumns, LongColumns, PRESETS, TimeColumn,
+    BodyColumns, ColumnMap, Delimiter, EulerColumns, LongColumns, PRESETS, RotationColumns,
+    TimeColumn,
 };
 pub use date_time::{DateTime, date_time};
 pub use encoding::utf8;

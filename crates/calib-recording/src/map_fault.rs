@@ -103,7 +103,7 @@ impl MapFault {
                 format!("map the joint too: `joints: {{{joint}: <column>}}`, or remove it from `reversed`")
             }
             Self::Rotations { .. } => {
-                "give exactly one of `quaternion_xyzw`, `quaternion_wxyz`, `rotation_vector`, `fixed_xyz` and `euler`"
+                "give exactly one of `quaternion_xyzw`, `quaternion_wxyz`, `rotation_vector`, `fixed_xyz`, `euler`, `rotation_matrix` and `axis_angle`"
                     .to_owned()
             }
             Self::LongKinds { .. } => {
@@ -162,7 +162,7 @@ impl ColumnMap {
             }
         }
         for (path, body) in self.body_columns() {
-            let count = body.rotation_count();
+            let count = body.rotations().count();
             if count != 1 {
                 faults.push(MapFault::Rotations { path, count });
             }
@@ -267,69 +267,27 @@ impl ColumnMap {
         }
         for (path, body) in self.body_columns() {
             let path: Vec<&str> = path.iter().map(String::as_str).collect();
-            for (keys, columns, quantity) in body.columns() {
-                for (i, column) in columns.iter().enumerate() {
-                    push(
-                        &[&path[..], keys, &[&i.to_string()]].concat(),
-                        column,
-                        quantity,
-                    );
+            let mut of_body = |keys: &[&str], i: usize, column, quantity| {
+                push(
+                    &[&path[..], keys, &[&i.to_string()]].concat(),
+                    column,
+                    quantity,
+                );
+            };
+            for (i, column) in body.position.iter().enumerate() {
+                of_body(&["position"], i, column, Quantity::Length);
+            }
+            for rotation in body.rotations() {
+                for (i, column) in rotation.columns().iter().enumerate() {
+                    let quantity = match rotation.angles().contains(&i) {
+                        true => Quantity::BodyAngle,
+                        false => Quantity::Other,
+                    };
+                    of_body(rotation.keys(), i, column, quantity);
                 }
             }
         }
         uses
-    }
-}
-
-impl BodyColumns {
-    pub(crate) fn rotation_count(&self) -> usize {
-        [
-            self.quaternion_xyzw.is_some(),
-            self.quaternion_wxyz.is_some(),
-            self.rotation_vector.is_some(),
-            self.fixed_xyz.is_some(),
-            self.euler.is_some(),
-        ]
-        .into_iter()
-        .map(usize::from)
-        .sum()
-    }
-
-    /// The columns by key.
-    fn columns(&self) -> impl Iterator<Item = (&'static [&'static str], &[String], Quantity)> {
-        fn of<const N: usize>(columns: &Option<[String; N]>) -> Option<&[String]> {
-            columns.as_ref().map(<[String; N]>::as_slice)
-        }
-        [
-            (
-                &["position"][..],
-                Some(self.position.as_slice()),
-                Quantity::Length,
-            ),
-            (
-                &["quaternion_xyzw"],
-                of(&self.quaternion_xyzw),
-                Quantity::Other,
-            ),
-            (
-                &["quaternion_wxyz"],
-                of(&self.quaternion_wxyz),
-                Quantity::Other,
-            ),
-            (
-                &["rotation_vector"],
-                of(&self.rotation_vector),
-                Quantity::BodyAngle,
-            ),
-            (&["fixed_xyz"], of(&self.fixed_xyz), Quantity::BodyAngle),
-            (
-                &["euler", "columns"],
-                self.euler.as_ref().map(|e| e.columns.as_slice()),
-                Quantity::BodyAngle,
-            ),
-        ]
-        .into_iter()
-        .filter_map(|(keys, columns, quantity)| Some((keys, columns?, quantity)))
     }
 }
 

@@ -2,6 +2,9 @@
 
 use crate::error::{Against, Problem};
 
+/// Of times that go back.
+const CLOCK_SET_BACK: &str = "if rows were exchanged, sort them by time; if the clock was set back here, add the difference to all later times, or make two recordings";
+
 impl Problem {
     /// What the person can do about it.
     #[must_use]
@@ -68,7 +71,7 @@ impl Problem {
             Problem::OtherTime { .. } => "write the times of all rows in one way",
             Problem::NotFinite { .. } => "leave the cell empty where nothing was measured",
             Problem::PartlyLost { .. } => "leave all empty when it was lost",
-            Problem::TimeBackwards { .. } => "sort the rows by time",
+            Problem::TimeBackwards { .. } => CLOCK_SET_BACK,
             Problem::FrameBackwards { .. } => "sort the rows by frame",
             Problem::RepeatedSample { .. } => "remove one of them",
             Problem::PoseTwice { .. } => "give every pose a name of its own",

@@ -123,6 +123,10 @@ pub struct Rejected {
 #[serde(rename_all = "snake_case")]
 #[non_exhaustive]
 pub enum RejectedFor {
+    /// It is a copy of an earlier measurement.
+    Copied,
+    /// The distances to the other markers of its body prove it false.
+    OutOfPlace,
     /// It lies on the way to a neighboring row.
     OnTheWay,
     /// Its hold drifts or scatters.

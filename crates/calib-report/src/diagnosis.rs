@@ -86,6 +86,7 @@ impl Diagnosis {
         let found = clock_offset(report)
             .or_else(|| scaled(report))
             .or_else(|| error(report))
+            .or_else(|| only_without_limits(report))
             .or_else(|| below_noise(report))
             .or_else(|| changed(report))
             .or_else(|| missing_effect(report))
@@ -264,10 +265,17 @@ const CAUSES: [Id; 6] = [
     catalog::JOINT_SCATTERS,
 ];
 
+/// Kinds of an offset of the clocks that the fit took into account: it made no error.
+const CORRECTED: [&str; 3] = ["corrected_behind", "corrected_ahead", "offset"];
+
 fn named(report: &Report) -> Option<Diagnosis> {
+    let is_corrected = |f: &crate::Finding| {
+        let kind = f.facts.get("kind").and_then(Fact::word);
+        f.id == catalog::CLOCK_LAG && kind.is_some_and(|kind| CORRECTED.contains(&kind))
+    };
     let warns = |id: &Id| {
         let mut findings = report.findings.iter();
-        findings.any(|f| f.id == *id && f.severity >= Severity::Warning)
+        findings.any(|f| f.id == *id && f.severity >= Severity::Warning && !is_corrected(f))
     };
     let id = CAUSES.into_iter().find(warns)?;
     Some(Diagnosis::NamedCause {
@@ -350,6 +358,15 @@ fn beyond_stated(report: &Report) -> Option<Diagnosis> {
     Some(Diagnosis::BeyondStated { evidence })
 }
 
+/// The profile sets no limits, and nothing else leaves the verdict open: whatever the findings warn of, without limits the answer stays the same.
+fn only_without_limits(report: &Report) -> Option<Diagnosis> {
+    let mut opens = (report.reason_facts.iter())
+        .filter(|r| matches!(r.effect, Effect::LeavesOpen | Effect::Rejects))
+        .peekable();
+    let any = opens.peek().is_some();
+    (any && opens.all(|r| r.id == ReasonId::NoLimits)).then_some(Diagnosis::NoLimits)
+}
+
 fn undecided(report: &Report) -> Option<Diagnosis> {
     // More poses do not mend an error that is larger than a limit.
     if any_exceeded(report) {
@@ -399,80 +416,4 @@ fn mostly_tracker(report: &Report) -> Option<f64> {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::Reason;
-    use calib_finding::{Finding, Subject};
-
-    /// The diagnosis of a rejected report with these findings.
-    fn of(findings: Vec<Finding>) -> Option<Diagnosis> {
-        Diagnosis::of(&Report {
-            verdict: Verdict::Rejected,
-            findings,
-            ..Report::default()
-        })
-    }
-
-    fn slip() -> Finding {
-        let subject = Subject::joint("elbow").in_recording("poses");
-        Finding::of_kind(catalog::CHANGED_WHILE_RECORDING, "joint", subject)
-    }
-
-    fn named(evidence: Id) -> Option<Diagnosis> {
-        let evidence = evidence.as_str().to_owned();
-        Some(Diagnosis::NamedCause { evidence })
-    }
-
-    fn fault(evidence: Id) -> Option<Diagnosis> {
-        let evidence = evidence.as_str().to_owned();
-        Some(Diagnosis::StructuralFault { evidence })
-    }
-
-    #[test]
-    fn errors_beyond_what_is_stated_come_before_poses_that_would_decide_a_limit() {
-        let of = |reasons: Vec<Reason>| {
-            Diagnosis::of(&Report {
-                verdict: Verdict::NotEvaluated,
-                reason_facts: reasons,
-                ..Report::default()
-            })
-        };
-        let undecided = || Reason::new(ReasonId::LimitUndecided, Effect::LeavesOpen);
-        let beyond = |effect| Reason::new(ReasonId::HeldOutBeyondStated, effect);
-        let poses = Diagnosis::TooFewPoses {
-            postures: None,
-            fitted: false,
-            tracker_m: None,
-        };
-        assert_eq!(of(vec![undecided()]), Some(poses.clone()));
-        assert_eq!(
-            of(vec![undecided(), beyond(Effect::LeavesOpen)]),
-            Some(Diagnosis::BeyondStated {
-                evidence: ReasonId::HeldOutBeyondStated.as_str().to_owned()
-            })
-        );
-        assert_eq!(of(vec![undecided(), beyond(Effect::Warns)]), Some(poses));
-    }
-
-    #[test]
-    fn a_slip_comes_before_what_it_leaves_in_the_validation() {
-        let moved = |joints: &[&str]| {
-            Finding::of_kind(catalog::TRACKER_MOVED, "held_out", About::Tracker)
-                .with("joints", Fact::names(joints.iter().copied()))
-        };
-        let zero = |joint: &str| Finding::new(catalog::JOINT_ZERO_CHANGED, Subject::joint(joint));
-        let slipped = named(catalog::CHANGED_WHILE_RECORDING);
-        assert_eq!(of(vec![moved(&["waist", "elbow"]), slip()]), slipped);
-        assert_eq!(of(vec![zero("elbow"), slip()]), slipped);
-        // What the slip does not explain is another fault.
-        let tracker = fault(catalog::TRACKER_MOVED);
-        assert_eq!(of(vec![moved(&["waist"]), slip()]), tracker);
-        assert_eq!(of(vec![moved(&["elbow"])]), tracker);
-        let other = fault(catalog::JOINT_ZERO_CHANGED);
-        assert_eq!(of(vec![zero("waist"), slip()]), other);
-        // Of the fitted recordings themselves it is no consequence.
-        let fitted = Finding::of_kind(catalog::TRACKER_MOVED, "moved", About::Tracker)
-            .with("joints", Fact::names(["elbow"]));
-        assert_eq!(of(vec![fitted, slip()]), tracker);
-    }
-}
+mod tests;

@@ -96,7 +96,12 @@ pub enum NextStep {
     /// Fix the problems of a rejected result.
     FixProblems,
     /// Record validation poses and set limits.
-    AddValidation,
+    AddValidation {
+        /// There are no validation poses.
+        poses: bool,
+        /// There are no limits.
+        limits: bool,
+    },
     /// Enable an effect that the residuals show and the model lacks.
     EnableEffect {
         /// What the residuals show.

@@ -12,6 +12,8 @@ mod scales;
 mod shapes;
 
 pub use held_out::held_out_in_training;
+pub use rigidity::out_of_place;
+pub use rows::{Copied, copied_rows, repeated_rows};
 pub use scales::other_scales;
 pub use shapes::other_shapes;
 

@@ -94,6 +94,27 @@ pub(super) fn rigidity(poses: &Poses, expected: &Expectations) -> Vec<Finding> {
     findings
 }
 
+/// Markers of rows in which they are farther out of place than their body is long, as the distances show: a reflection was taken for the marker.
+///
+/// No model of the robot takes part: the others are where they belong without this one, and only without this one.
+#[must_use]
+pub fn out_of_place(poses: &Poses, expected: &Expectations) -> Vec<(String, usize)> {
+    let mut found = Vec::new();
+    for (name, markers) in &expected.bodies {
+        let all = |marker: &String| poses.markers.contains_key(marker);
+        if !markers.iter().all(all) {
+            continue;
+        }
+        let Some(body) = Body::new(name, markers, poses, expected) else {
+            continue;
+        };
+        if body.redefined(poses).is_none() && body.loose_markers().is_empty() {
+            found.extend(body.gross(poses.len()));
+        }
+    }
+    found
+}
+
 /// Markers of a body that the recording does not have.
 fn missing_markers(
     body: &str,

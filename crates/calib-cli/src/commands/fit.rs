@@ -154,10 +154,10 @@ pub struct FitHandEye {
     /// The table: poses of two bodies in each row
     #[arg(required_unless_present = "list")]
     pub file: Option<PathBuf>,
-    /// Prefix of the columns of the flange in the robot's base: `flange_x` … `flange_qw`
+    /// Prefix of the columns of the flange in the robot's base: `flange_x` … `flange_qw`, `flange_rvec_z` or `flange_r33`
     #[arg(long, default_value = "flange")]
     pub robot: String,
-    /// Prefix of the columns of the measured body in the tracker's frame: `meas_x` … `meas_qw`
+    /// Prefix of the columns of the measured body in the tracker's frame: `meas_x` … `meas_qw`, `meas_rvec_z` or `meas_r33`
     #[arg(long, default_value = "meas")]
     pub measured: String,
     /// The measured poses are inverted: the board or tag in the camera, as its detector states it

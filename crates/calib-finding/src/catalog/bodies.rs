@@ -11,10 +11,10 @@ super::topic! {
             "Cut the recording at that row, or leave the marker out of the body: it slipped or was relabeled.";
         "between": Error,
             "The distance between `{first}` and `{second}` differs by {change} from that in `{other}`.",
-            "Leave one of the recordings out, or give the body another name in it (`names`): a marker was moved or relabeled between them, or the body was created again.";
+            "Leave one of the recordings out, or give the body another name in it, with a column map of that recording (`columns: {markers: …}`, or `bodies`) and as a body of its own: a marker was moved or relabeled between them, or the body was created again.";
         "marker_between": Error,
             "Marker `{marker}` is at another place of the body than in `{other}`: only its distances differ, by up to {change}.",
-            "Leave the marker out of the body, or give the body another name in one of the recordings (`names`): the marker was moved or relabeled between them.";
+            "Leave the marker out of the body, or give the body another name in one of the recordings, with a column map of that recording (`columns: {markers: …}`) and as a body of its own: the marker was moved or relabeled between them.";
     }
     /// A body that is not rigid.
     NOT_RIGID = "not-rigid" {
@@ -62,7 +62,7 @@ super::topic! {
     MARKER_OUTLIER = "marker-outlier" {
         "": Warning,
             "A marker is out of place in {rows:row}; the worst is `{marker}`, by {off}.",
-            "Drop these samples: a reflection or a neighboring marker was taken for the marker.";
+            "Drop these samples: a reflection or a neighboring marker was taken for the marker. Those that are grossly off are left out.";
     }
     /// A body of very many markers, as a few points.
     BODY_CONDENSED = "body-condensed" {

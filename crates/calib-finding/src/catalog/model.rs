@@ -206,7 +206,7 @@ super::topic! {
             "The file has the pose of the tracker in the body's frame. Say so in the column map, `columns: {bodies: {NAME: {position: [X, Y, Z], quaternion_xyzw: [X, Y, Z, W], inverted: true}}}`, or export the pose of the body in the tracker's frame.";
         "transposed": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} with the rotations of {bodies:code} transposed[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
-            "Export the rotation from body to tracker coordinates: the file has its inverse.";
+            "The file has the rotation from tracker to body coordinates. Export its inverse; columns of a matrix can be listed column by column in the column map, `columns: {bodies: {NAME: {position: [X, Y, Z], rotation_matrix: [R11, R21, R31, R12, R22, R32, R13, R23, R33]}}}`.";
     }
     /// The recordings contradict the nominal robot, and nothing that is known explains it.
     MODEL_DISAGREES = "model-disagrees" {

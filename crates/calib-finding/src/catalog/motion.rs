@@ -36,9 +36,12 @@ super::topic! {
     }
     /// Rows that stand in a recording twice.
     ROWS_REPEATED = "rows-repeated" {
-        "": Warning,
-            "{repeated} of {rows:row} repeat an earlier row in every joint and every tracked value.",
-            "Remove the copies: each measurement must appear once, or the uncertainties come out too small.";
+        "within": Warning,
+            "{repeated} of {rows:row} repeat an earlier row in every joint and every tracked value. They are copies of the same measurements and were left out.",
+            "Remove the copies from the file: counted twice, they would make the uncertainties too small.";
+        "recordings": Warning,
+            "{repeated} of {rows:row} repeat rows of {of:code} in every joint and every tracked value. They are copies of the same measurements and were left out.",
+            "Remove the recording from the profile, or the copies from its file: counted twice, they would make the uncertainties too small.";
     }
     /// A table with more rows than the tracker has frames.
     FRAMES_REPEATED = "frames-repeated" {

@@ -1,6 +1,6 @@
 //! How the columns of an orientation are read.
 
-use calib_recording::{BodyColumns, EulerAxes};
+use calib_recording::{BodyColumns, EulerAxes, RotationColumns};
 use serde::Serialize;
 
 /// How numbers state an orientation.
@@ -16,30 +16,40 @@ pub enum Notation {
     RotationVector,
     /// Angles about axes that turn with the body.
     Euler(EulerAxes),
+    /// A matrix, row by row.
+    Matrix,
+    /// The axis, and the angle about it.
+    AxisAngle,
 }
 
 impl Notation {
     /// That of a body's columns, and these in its order.
     #[must_use]
     pub fn of(body: &BodyColumns) -> Option<(Self, Vec<String>)> {
-        let quaternion = |columns: &[String; 4], scalar_first| {
-            (Self::Quaternion { scalar_first }, columns.to_vec())
-        };
-        if let Some(columns) = &body.quaternion_xyzw {
-            return Some(quaternion(columns, false));
-        }
-        if let Some(columns) = &body.quaternion_wxyz {
-            return Some(quaternion(columns, true));
-        }
-        if let Some(columns) = &body.rotation_vector {
-            return Some((Self::RotationVector, columns.to_vec()));
-        }
-        if let Some(columns) = &body.fixed_xyz {
-            let columns = columns.iter().rev().cloned().collect();
-            return Some((Self::Euler(EulerAxes::Zyx), columns));
-        }
-        let euler = body.euler.as_ref()?;
-        Some((Self::Euler(euler.axes), euler.columns.to_vec()))
+        Some(match body.rotations().next()? {
+            RotationColumns::QuaternionXyzw(of) => {
+                let scalar_first = false;
+                (Self::Quaternion { scalar_first }, of.to_vec())
+            }
+            RotationColumns::QuaternionWxyz(of) => {
+                let scalar_first = true;
+                (Self::Quaternion { scalar_first }, of.to_vec())
+            }
+            RotationColumns::RotationVector(of) => (Self::RotationVector, of.to_vec()),
+            RotationColumns::FixedXyz(of) => {
+                let of = of.iter().rev().cloned().collect();
+                (Self::Euler(EulerAxes::Zyx), of)
+            }
+            RotationColumns::Euler(axes, of) => (Self::Euler(axes), of.to_vec()),
+            RotationColumns::Matrix(of) => (Self::Matrix, of.to_vec()),
+            RotationColumns::AxisAngle(of) => (Self::AxisAngle, of.to_vec()),
+        })
+    }
+
+    /// Whether some of its numbers have a unit.
+    #[must_use]
+    pub fn has_angles(self) -> bool {
+        !matches!(self, Self::Quaternion { .. } | Self::Matrix)
     }
 }
 

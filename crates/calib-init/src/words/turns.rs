@@ -36,6 +36,8 @@ fn what(notation: Notation, unit: Option<AngleUnit>) -> String {
     match notation {
         Notation::Quaternion { scalar_first: true } => "a quaternion, scalar first".to_owned(),
         Notation::Quaternion { .. } => "a quaternion, scalar last".to_owned(),
+        Notation::Matrix => "a rotation matrix, row by row".to_owned(),
+        Notation::AxisAngle => format!("an axis of rotation and the angle about it{unit}"),
         Notation::RotationVector => format!("a rotation vector{unit}"),
         Notation::Euler(axes) => {
             let [a, b, c] = axes.axes().map(|axis| ["x", "y", "z"][axis]);

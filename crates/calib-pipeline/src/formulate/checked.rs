@@ -9,6 +9,7 @@ use crate::estimate::start::{Start, start};
 use crate::formulate::{held, model_checks};
 use crate::prepare::checks;
 use crate::prepare::condensed::condense;
+use crate::prepare::ghosts;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::relabel::relabel;
 use crate::prepare::split::split;
@@ -41,6 +42,9 @@ pub fn check_data(
         findings.extend(held::take_out(inputs));
     }
     findings.extend(checks::check(inputs));
+    if inputs.robot.profile.solve.robust {
+        ghosts::take_out(inputs, &findings);
+    }
     split(inputs);
     findings.extend(condense(inputs));
     findings.extend(of_shapes);

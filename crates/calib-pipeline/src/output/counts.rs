@@ -55,7 +55,11 @@ pub(crate) fn fates(
         .map(|pose| (pose.pose.as_str(), pose.subject.as_str()))
         .collect();
     let held = inputs.excluded.iter();
-    let without = [RejectedFor::HeldReadings, RejectedFor::StuckReading];
+    let without = [
+        RejectedFor::Copied,
+        RejectedFor::HeldReadings,
+        RejectedFor::StuckReading,
+    ];
     let held = held.filter(|out| without.contains(&out.cause));
     let held: BTreeSet<(&str, usize)> = held.map(|out| (out.recording.as_str(), out.row)).collect();
     let mut out = Tracks::new();

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use calib_core::NoiseKind;
 use calib_finding::{Finding, Severity, catalog};
 use calib_geometry::statistics::median;
+use calib_profile::Usage;
 use calib_report::{
     FoundNoise, Goodness, HeldOut, ImplausibleChange, Improvement, Limit, Orientation, Share,
     SingleJoint, Solver, Unit, UrdfAlone, Validation, VerdictFacts,
@@ -200,6 +201,13 @@ fn goodness(e: &Evidence<'_>, fit: &MlFit) -> Goodness {
     // Means of holds have less noise than the rows that a profile states it of: those are no less certain than stated for it.
     let samples = &fit.formulation.samples;
     let within = HeldOutLevels::of(e.inputs, samples).within;
+    // The same of frames of one posture.
+    let fitted = e.inputs.recordings.values();
+    let fitted = fitted.filter(|r| r.spec.usage != Usage::Validation);
+    let of_frames = |kind: NoiseKind| {
+        let merged = fitted.clone().map(|r| r.row_noise.of_kind(kind));
+        merged.fold(within.of_kind(kind), f64::max)
+    };
     let levels = row_levels(e.inputs, samples);
     // Where recordings have levels of their own, each has a scatter of its own.
     let rigid_of = |group: &str| {
@@ -215,7 +223,7 @@ fn goodness(e: &Evidence<'_>, fit: &MlFit) -> Goodness {
         let known = n.estimated && n.kind != NoiseKind::Scale;
         let relative = n.relative_error.filter(|_| known)?;
         let factor = n.sigma / stated;
-        let of_rows = n.sigma.max(within.of_kind(n.kind).sqrt()) / stated;
+        let of_rows = n.sigma.max(of_frames(n.kind).sqrt()) / stated;
         // What is beyond doubt above or below what is stated. Joints' noise hides behind that of markers: its square, not its logarithm, is found with
         // an error that does not depend on it.
         let certain = CERTAIN[usize::from(few.is_none())];

@@ -147,7 +147,10 @@ pub(crate) fn next_steps(
             urdf: e.inputs.robot.profile.outputs.urdf.clone(),
             effects: effects_file(e),
         },
-        Verdict::NotEvaluated if !has_limits || !has_validation => NextStep::AddValidation,
+        Verdict::NotEvaluated if !has_limits || !has_validation => NextStep::AddValidation {
+            poses: !has_validation,
+            limits: !has_limits,
+        },
         Verdict::Rejected | Verdict::NotEvaluated => NextStep::FixProblems,
     }];
     if let Some(first) = missing.first() {

@@ -95,12 +95,12 @@ fn without_coordinates<'a>(inputs: &Inputs, loaded: &'a Loaded) -> Cow<'a, Poses
     poses
 }
 
-/// The rows that do not have the joint readings of another one; `None` where that is all of them.
+/// The rows that are not copies of another one and do not have its joint readings; `None` where that is all of them.
 fn without_held(inputs: &Inputs, loaded: &Loaded, tracked: &Poses) -> Option<Poses> {
     let out = inputs.excluded.iter();
     let out = out.filter(|out| out.recording == loaded.name);
     let held: BTreeSet<usize> = out
-        .filter(|out| out.cause == RejectedFor::HeldReadings)
+        .filter(|out| matches!(out.cause, RejectedFor::HeldReadings | RejectedFor::Copied))
         .map(|out| out.row)
         .collect();
     let rest: Vec<usize> = (0..tracked.len())
@@ -114,7 +114,13 @@ fn fewest_poses(inputs: &Inputs, loaded: &Loaded) -> usize {
     let of_static = inputs.recordings.values();
     let of_static = of_static.filter(|r| r.spec.usage == Usage::Static);
     let poses: usize = of_static.map(|r| r.poses.len()).sum();
+    let copies = inputs.excluded.iter();
+    let copies = copies.filter(|out| out.cause == RejectedFor::Copied);
+    let copies = copies.filter(|out| out.recording == loaded.name);
+    let copies: BTreeSet<usize> = copies.map(|out| out.row).collect();
     match loaded.spec.usage {
+        // What it says is said by another recording.
+        _ if !copies.is_empty() && copies.len() == loaded.poses.len() => 0,
         Usage::Validation => 1,
         Usage::Static if poses >= MIN_POSES => 1,
         Usage::Static | Usage::Sweep => MIN_POSES,
@@ -224,7 +230,7 @@ fn followers(model: &RobotModel, loaded: &Loaded) -> BTreeMap<String, [f64; 2]> 
     out
 }
 
-fn expectations(inputs: &Inputs, loaded: &Loaded) -> Expectations {
+pub(crate) fn expectations(inputs: &Inputs, loaded: &Loaded) -> Expectations {
     let model = &inputs.robot.model;
     let profile = &inputs.robot.profile;
     let name = |id: &calib_urdf::JointId| model.joint(*id).name.clone();

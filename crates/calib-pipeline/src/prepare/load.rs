@@ -12,6 +12,7 @@ use calib_urdf::sha256_hex;
 use crate::error::{DataProblem, NamedBy, PipelineError, WhyUnread};
 use crate::options::Plugins;
 use crate::prepare::align::align;
+use crate::prepare::copied;
 use crate::prepare::estimators::{Estimators, values};
 use crate::prepare::inputs::stated_sights;
 use crate::prepare::robot::urdf_warnings;
@@ -106,6 +107,7 @@ pub fn load_recordings_with(
         estimators: Arc::new(estimators),
     };
     inputs.exclude(excluded);
+    copied::leave_out(&mut inputs);
     inputs.findings.extend(named::unused(&inputs));
     effects::evaluate(&inputs)?;
     Ok(inputs)

@@ -7,9 +7,13 @@
 
 use calib_finding::{Fact, Finding, Subject, catalog};
 use calib_geometry::mean::chordal_mean;
-use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion, Vector3};
+use calib_recording::Poses;
+use nalgebra::{
+    Isometry3, Matrix3, Matrix6, Point3, Translation3, UnitQuaternion, Vector3, Vector6,
+};
 
 use crate::prepare::inputs::{Inputs, Loaded};
+use crate::prepare::row_noise::RowNoise;
 use crate::prepare::slides::scales;
 
 /// Joint values of a robot at rest stay within this, rad, or m where the robot is large: two steps of an encoder of 16 bits, 0.011°.
@@ -170,6 +174,7 @@ fn agree(loaded: &Loaded, a: usize, b: usize, tolerance: f64) -> bool {
 fn merge_rows(loaded: &mut Loaded, groups: &[Vec<usize>]) {
     let firsts: Vec<usize> = groups.iter().map(|group| group[0]).collect();
     let all = &loaded.poses;
+    loaded.row_noise = frame_noise(all, groups);
     let mut kept = all.select(&firsts);
     for (name, track) in &all.markers {
         let means = groups.iter().map(|group| mean_point(&frames(track, group)));
@@ -184,6 +189,40 @@ fn merge_rows(loaded: &mut Loaded, groups: &[Vec<usize>]) {
         .map(|group| mean_values(group.iter().map(|row| loaded.q[*row].as_ref())))
         .collect();
     loaded.poses = kept;
+}
+
+/// The noise of single frames about the means of their postures.
+fn frame_noise(poses: &Poses, groups: &[Vec<usize>]) -> RowNoise {
+    let several = || groups.iter().filter(|group| group.len() > 1);
+    let markers = poses.markers.values().map(|track| {
+        let scatter = several().map(|group| scatter_of_points(&frames(track, group)));
+        scatter.collect::<Vec<_>>()
+    });
+    let bodies = poses.bodies.values().map(|track| {
+        let scatter = several().map(|group| scatter_of_poses(&frames(track, group)));
+        scatter.collect::<Vec<_>>()
+    });
+    let (markers, bodies): (Vec<_>, Vec<_>) = (markers.collect(), bodies.collect());
+    RowNoise::of(markers.iter(), bodies.iter())
+}
+
+/// Covariance of points about their mean, m².
+fn scatter_of_points(seen: &[Point3<f64>]) -> Option<Matrix3<f64>> {
+    let mean = mean_point(seen).filter(|_| seen.len() > 1)?;
+    let squares = seen.iter().map(|p| (p - mean) * (p - mean).transpose());
+    Some(squares.sum::<Matrix3<f64>>() / (seen.len() - 1) as f64)
+}
+
+/// Covariance of poses about their mean, rotation (rad) first.
+fn scatter_of_poses(seen: &[Isometry3<f64>]) -> Option<Matrix6<f64>> {
+    let mean = mean_pose(seen).filter(|_| seen.len() > 1)?;
+    let squares = seen.iter().map(|pose| {
+        let turned = (mean.rotation.inverse() * pose.rotation).scaled_axis();
+        let moved = pose.translation.vector - mean.translation.vector;
+        let off = Vector6::from_fn(|i, _| if i < 3 { turned[i] } else { moved[i - 3] });
+        off * off.transpose()
+    });
+    Some(squares.sum::<Matrix6<f64>>() / (seen.len() - 1) as f64)
 }
 
 /// What these rows show.

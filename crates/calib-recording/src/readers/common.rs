@@ -5,15 +5,10 @@ use crate::error::{At, Placed, Problem};
 use crate::growth::push;
 use crate::model::{BodyStream, MarkerSample, MarkerStream};
 use crate::placeholder::{Placeholders, is_placeholder_point};
-use crate::table::UNIT_TOLERANCE;
 use crate::text::{Number, Separator, cells, not_a_number, number, ragged};
 use calib_finding::{About, Fact, Finding, Subject, catalog};
-use calib_geometry::so3;
-use nalgebra::{Isometry3, Matrix3, Point3, Quaternion, Translation3, UnitQuaternion};
+use nalgebra::{Isometry3, Point3, Translation3, UnitQuaternion};
 use std::collections::BTreeMap;
-
-/// How far a written rotation matrix may be from orthonormal: three decimals are rounded to 5e-4.
-const MATRIX_TOLERANCE: f64 = 5e-3;
 
 /// The numbers of a row; NaN = empty or a word for it. The row may be shorter than `columns` (trackers drop what is
 /// lost at the end), not longer except by empty cells. `values` keeps its length.
@@ -208,50 +203,6 @@ pub(super) fn body_stream(name: &str) -> BodyStream {
         quality: Vec::new(),
         covariance: Vec::new(),
     }
-}
-
-/// A unit quaternion from its parts `[x, y, z, w]`.
-pub(super) fn quaternion(
-    at: At,
-    body: &str,
-    [x, y, z, w]: [f64; 4],
-) -> Placed<UnitQuaternion<f64>> {
-    let q = Quaternion::new(w, x, y, z);
-    let norm = q.norm();
-    if norm.is_nan() || (norm - 1.0).abs() > UNIT_TOLERANCE {
-        return Err((
-            at,
-            Problem::NotUnit {
-                body: body.to_string(),
-                norm,
-                tolerance: UNIT_TOLERANCE,
-            },
-        ));
-    }
-    Ok(UnitQuaternion::from_quaternion(q))
-}
-
-/// The rotation nearest to a written matrix, if it is one but for rounding; a mirrored one is refused.
-pub(super) fn rotation(at: At, body: &str, matrix: &Matrix3<f64>) -> Placed<UnitQuaternion<f64>> {
-    let departure = (matrix.transpose() * matrix - Matrix3::identity())
-        .abs()
-        .max();
-    let determinant = matrix.determinant();
-    let nearest = (departure <= MATRIX_TOLERANCE && determinant > 0.0)
-        .then(|| so3::nearest_rotation(matrix))
-        .flatten();
-    nearest.ok_or_else(|| {
-        let body = body.to_string();
-        (
-            at,
-            Problem::NotRotation {
-                body,
-                determinant,
-                departure,
-                tolerance: MATRIX_TOLERANCE,
-            },
-        )
-    })
 }
 
 pub(super) fn pose(position: Point3<f64>, rotation: UnitQuaternion<f64>) -> Isometry3<f64> {

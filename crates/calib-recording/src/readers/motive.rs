@@ -15,13 +15,14 @@
 //! The file does not say which axis is up (Y unless changed at export).
 
 use super::common::{
-    Instants, MarkerTrack, Triplet, body_stream, first_cell, numbers, pose, quaternion, take_zeros,
+    Instants, MarkerTrack, Triplet, body_stream, first_cell, numbers, pose, take_zeros,
     tracker_clock, triplet, unexpected, unique_names,
 };
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
 use crate::growth::push;
 use crate::model::{BodyStream, Recording, Timeline};
+use crate::rotation::quaternion;
 use crate::text::{Lines, Separator, cells};
 use crate::units::LengthUnit;
 use calib_finding::{About, Finding};

@@ -7,13 +7,13 @@
 
 use super::common::{
     Instants, MarkerTrack, Triplet, all_zero, body_stream, frame_count_differs, head_text,
-    is_frame_number, numbers, pose, rotation, take_zeros, tracker_clock, triplet, unexpected,
-    unique_names,
+    is_frame_number, numbers, pose, take_zeros, tracker_clock, triplet, unexpected, unique_names,
 };
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
 use crate::growth::push;
 use crate::model::{BodyStream, Recording, Timeline};
+use crate::rotation::from_matrix;
 use crate::text::{Lines, Number, Separator, cells, number};
 use crate::units::LengthUnit;
 use calib_finding::{About, Finding, Subject};
@@ -365,7 +365,7 @@ fn read_body(body: &mut Body, line: u64, row: u64, values: &[f64], per_meter: f6
         // Written by columns, as nalgebra stores it.
         Some(point) => Some(pose(
             point,
-            rotation(
+            from_matrix(
                 At::Line(line),
                 &body.stream.name,
                 &Matrix3::from_column_slice(&matrix),

@@ -11,7 +11,6 @@ mod write_mapped;
 pub(crate) use header::{Known, is_canonical, length_unit};
 pub use read::WRITTEN_LIVE;
 pub(crate) use read::read_table;
-pub(crate) use rows::UNIT_TOLERANCE;
 pub use stated_unit::{StatedUnit, UnitRow};
 pub use unit_row::unit_row;
 pub use write::{NotWritten, WriteOptions, joint_column, write_poses, write_recording};

@@ -11,7 +11,7 @@ use nalgebra::{Isometry3, Point3};
 
 use super::header::{Column, Known, Layout, Rotation};
 use super::write::{NotWritten, WriteOptions, columns, push_number, state_joints};
-use crate::column_map::{ColumnMap, Delimiter};
+use crate::column_map::{ColumnMap, Delimiter, RotationColumns};
 use crate::model::Filled;
 use crate::poses::Poses;
 use crate::readers::{ReadOptions, read_bytes};
@@ -108,12 +108,8 @@ fn header(poses: &Poses, map: &ColumnMap, options: &WriteOptions) -> Vec<String>
     names.extend(of_robot.chain(map.temperatures.values()).cloned());
     for body in map.bodies.values() {
         names.extend(body.position.iter().cloned());
-        let quaternion = body.quaternion_xyzw.iter().chain(&body.quaternion_wxyz);
-        names.extend(quaternion.flatten().cloned());
-        let euler = body.euler.as_ref().map(|euler| &euler.columns);
-        let angles = body.rotation_vector.iter().chain(&body.fixed_xyz);
-        let angles = angles.chain(euler);
-        names.extend(angles.flatten().cloned());
+        let turns = body.rotations().flat_map(RotationColumns::columns);
+        names.extend(turns.cloned());
     }
     names.extend(map.markers.values().flatten().cloned());
     names.extend(map.labels.iter().cloned());
@@ -223,6 +219,9 @@ fn values<'a>(
                         [a, b, c][i]
                     }
                     Rotation::Euler(axes, _) => axes.angles(&rotation)[i],
+                    Rotation::Matrix(_) => rotation.to_rotation_matrix()[(i / 3, i % 3)],
+                    Rotation::AxisAngle(_) if i == 3 => rotation.angle(),
+                    Rotation::AxisAngle(_) => rotation.axis().map_or(0.0, |axis| axis[i]),
                 })
             };
             put(*slot, Box::new(at));

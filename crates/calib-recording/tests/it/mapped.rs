@@ -1,8 +1,11 @@
 //! Tables that are written for a column map: the map reads back what was written, or the reason is stated.
 
+use std::f64::consts::FRAC_PI_2;
+
 use calib_recording::{
     ColumnMap, Filled, Poses, ReadOptions, WriteOptions, read_bytes, write_mapped,
 };
+use nalgebra::{UnitQuaternion, Vector3};
 
 fn poses() -> Poses {
     let text = "elbow_deg,lift_mm,wrist_deg,elbow_nm,m1.x_mm,m1.y_mm,m1.z_mm,m2.x_mm,m2.y_mm,m2.z_mm,hand.x_m,hand.y_m,hand.z_m,hand.qx,hand.qy,hand.qz,hand.qw\n\
@@ -41,6 +44,70 @@ fn joints_x_y_and_z_beside_a_mapped_body_are_no_marker() {
     assert!(read.markers.is_empty(), "{:?}", read.markers);
     let of = |joint: &str| read.joints[joint][0].expect("given");
     assert_eq!([of("x"), of("y"), of("z")], [0.1, 0.2, -0.05]);
+}
+
+/// Matrices and axes with angles: a quarter turn about z, written by hand; what is no rotation is refused with its row.
+#[test]
+fn matrices_and_axes_with_angles_must_be_rotations() {
+    let read = |turn: &str, names: &str, numbers: &str| {
+        let names: Vec<String> = names.split(',').map(|name| format!("{name:?}")).collect();
+        let body = format!(
+            r#"{{"bodies": {{"hand": {{"position": ["x", "y", "z"], "{turn}": [{}]}}}}}}"#,
+            names.join(",")
+        );
+        let options = ReadOptions {
+            columns: Some(map(&body)),
+            ..ReadOptions::default()
+        };
+        let names = names.join(",").replace('"', "");
+        let text = format!(
+            "x,y,z,{names}\n0,0,0,{}\n1,2,3,{numbers}\n",
+            "0,".repeat(names.split(',').count() - 1) + "0"
+        );
+        let read = read_bytes("t.csv", text.as_bytes(), &options).map_err(|e| e.to_string())?;
+        let read = read.poses(Filled::Exclude).expect("one table");
+        Ok::<_, String>(read.bodies["hand"].clone())
+    };
+    let nine = "a,b,c,d,e,f,g,h,i";
+    let four = "a,b,c,d_deg";
+    let quarter = UnitQuaternion::from_axis_angle(&Vector3::z_axis(), FRAC_PI_2);
+    for (turn, names, numbers) in [
+        ("rotation_matrix", nine, "0,-1,0,1,0,0,0,0,1"),
+        ("axis_angle", four, "0,0,1,90"),
+        ("axis_angle", four, "0,0,-1,-90"),
+    ] {
+        let read = read(turn, names, numbers).unwrap_or_else(|e| panic!("{e}"));
+        let pose = read[1].expect("given");
+        assert!(pose.rotation.angle_to(&quarter) < 1e-12, "{turn}: {pose}");
+        assert_eq!(pose.translation.vector, Vector3::new(1.0, 2.0, 3.0));
+    }
+    // A row of zeros is a body that was lost.
+    let lost = read("rotation_matrix", nine, "1,0,0,0,1,0,0,0,1").unwrap_or_else(|e| panic!("{e}"));
+    assert_eq!(lost[0], None);
+    for (turn, names, numbers, says) in [
+        (
+            "rotation_matrix",
+            nine,
+            "0,1,0,1,0,0,0,0,1",
+            "determinant -1.0000",
+        ),
+        (
+            "rotation_matrix",
+            nine,
+            "0,-1.1,0,1,0,0,0,0,1",
+            "the matrix is no rotation",
+        ),
+        ("rotation_matrix", nine, "0,-1,0,1,0,0,0,,1", "11 of 12"),
+        (
+            "axis_angle",
+            four,
+            "0,0,2,90",
+            "the axis of rotation has length 2.000000",
+        ),
+    ] {
+        let error = read(turn, names, numbers).expect_err(says);
+        assert!(error.contains(says) && error.contains("t.csv:3"), "{error}");
+    }
 }
 
 /// Angles of a body in another unit than joints, about axes that turn, and a pose of the tracker in the body: by hand, 90° about z, then 90° about the new x.
@@ -113,6 +180,8 @@ fn a_map_reads_back_what_was_written_for_it() {
         r#"{"bodies": {"hand": {"position": ["x", "y", "z"], "quaternion_wxyz": ["a", "b", "c", "d"]}}, "delimiter": "space", "skip_lines": 3}"#,
         r#"{"bodies": {"hand": {"position": ["x", "y", "z"], "euler": {"axes": "zyz", "columns": ["o", "a", "t"]}}}, "body_angles": "deg"}"#,
         r#"{"bodies": {"hand": {"position": ["x", "y", "z"], "euler": {"axes": "xyz", "columns": ["u", "v", "w"]}, "inverted": true}}}"#,
+        r#"{"bodies": {"hand": {"position": ["x", "y", "z"], "rotation_matrix": ["a", "b", "c", "d", "e", "f", "g", "h", "i"]}}}"#,
+        r#"{"bodies": {"hand": {"position": ["x", "y", "z"], "axis_angle": ["ux", "uy", "uz", "a_deg"], "inverted": true}}}"#,
         r#"{"joints": {"elbow": "A1"}, "time": {"column": "t", "unit": "ms"}, "delimiter": "tab"}"#,
         r#"{"names": ["e", "l", "w", "x", "y", "z", "u", "v", "s", "p", "q", "r", "a", "b", "c", "d", "n"],
             "joints": {"elbow": "e", "wrist": "w"}, "prismatic": {"lift": "l"}, "torques": {"elbow": "n"},

@@ -72,13 +72,16 @@ pub struct HeldOut {
 }
 
 impl HeldOut {
-    /// Whether the patched URDF predicts better than the untouched one also without the joint effects that it cannot hold.
+    /// Whether the patched URDF gains at least half of what the calibration gains over the untouched one, in mean squares, also without the joint effects
+    /// that it cannot hold.
     #[must_use]
     pub fn urdf_alone_gains(&self) -> bool {
-        match (self.urdf_alone, self.registration_only) {
-            (Some(alone), Some(untouched)) => alone.rms_m < untouched.rms_m,
-            _ => true,
-        }
+        let (Some(alone), Some(untouched)) = (self.urdf_alone, self.registration_only) else {
+            return true;
+        };
+        let with = self.calibrated.map_or(alone.rms_m, |with| with.rms_m);
+        let gained = |error: f64| untouched.rms_m.powi(2) - error.powi(2);
+        alone.rms_m < untouched.rms_m && gained(alone.rms_m) >= 0.5 * gained(with)
     }
 
     /// The same of the URDF that was fitted to be used without effects.

@@ -20,7 +20,7 @@ impl NextStep {
                     format!(" Where a program reads only a URDF, use `{file}`, which was fitted to be used without them.")
                 });
                 format!(
-                    "Use the model file `{model}` (`calib predict`, `calib correct`), not the calibrated URDF: without the joint effects that a URDF cannot hold it predicts new poses no better than the untouched one.{alone}"
+                    "Use the model file `{model}` (`calib predict`, `calib correct`), not the calibrated URDF: without the joint effects that a URDF cannot hold it predicts new poses hardly better than the untouched one.{alone}"
                 )
             }
             Self::KeepUrdf { scene } => format!(
@@ -33,9 +33,13 @@ impl NextStep {
             Self::FixProblems => {
                 "Do not use this result until the problems above are fixed.".to_owned()
             }
-            Self::AddValidation => {
-                "Record validation poses, set `solve.limits` in the profile, and run again."
-                    .to_owned()
+            Self::AddValidation { poses, limits } => {
+                let what = match (poses, limits) {
+                    (true, true) => "Record validation poses, set `solve.limits` in the profile,",
+                    (true, false) => "Record validation poses,",
+                    (false, _) => "Set `solve.limits` in the profile,",
+                };
+                format!("{what} and run again.")
             }
             Self::EnableEffect { missing } => format!(
                 "Enable the missing effect in the profile: {}",

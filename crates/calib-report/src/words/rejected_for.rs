@@ -7,6 +7,10 @@ impl RejectedFor {
     #[must_use]
     pub fn words(self) -> &'static str {
         match self {
+            Self::Copied => "a copy of an earlier row",
+            Self::OutOfPlace => {
+                "far from where the other markers of the body show it: a reflection or another marker"
+            }
             Self::OnTheWay => {
                 "not settled: explained by interpolating the joint values toward an adjacent row"
             }
@@ -31,9 +35,12 @@ impl RejectedFor {
     /// At which stage they were taken out, as a participle: what a count of rejected measurements includes, and what it does not.
     pub(crate) fn stage(self) -> &'static str {
         match self {
-            Self::OnTheWay | Self::RestlessHold | Self::HeldReadings | Self::StuckReading => {
-                "excluded before the fit"
-            }
+            Self::Copied
+            | Self::OutOfPlace
+            | Self::OnTheWay
+            | Self::RestlessHold
+            | Self::HeldReadings
+            | Self::StuckReading => "excluded before the fit",
             Self::NotSettled | Self::Occlusion | Self::Outlier | Self::Swap => {
                 "rejected by the fit"
             }

@@ -7,6 +7,9 @@ use nalgebra::Point3;
 use super::{ALL_PERMUTATIONS, ALWAYS_THE_SAME, BENDING, Body, OWN_SIGMAS, Pair, ROWS, distances};
 use crate::statistics::{median, range};
 
+/// Markers seen in a row of which one can be shown to be out of place: the distance of the two others is right, and no other one.
+const FEWEST: usize = 3;
+
 /// A row with one marker out of place.
 struct Outlier {
     /// As the recording numbers it.
@@ -81,10 +84,34 @@ impl<'a> Body<'a> {
         findings
     }
 
+    /// Markers that are grossly out of place, with their rows.
+    pub(super) fn gross(&self, rows: usize) -> Vec<(String, usize)> {
+        let of_row = |row: usize| {
+            let points: Vec<Option<Point3<f64>>> =
+                self.tracks.iter().map(|track| track[row]).collect();
+            let marker = self.no_marker(&points, &self.explained_by_one(&points))?;
+            Some((self.markers[marker].to_owned(), row))
+        };
+        (0..rows).filter_map(of_row).collect()
+    }
+
+    /// The marker that is farther off than the body is long, where it `alone` explains a row: no marker moves so far on its body.
+    fn no_marker(&self, points: &[Option<Point3<f64>>], alone: &[usize]) -> Option<usize> {
+        let [marker] = *alone else { return None };
+        let longest = self.pairs.iter().map(|pair| pair.distance);
+        let longest = longest.fold(self.tolerance, f64::max);
+        let seen = points.iter().flatten().count();
+        (seen >= FEWEST && self.off(points, marker) > longest).then_some(marker)
+    }
+
     /// A row with its marker out of place, by how much, and in `alone` the markers each of which explains it alone.
     fn outlier(&self, poses: &Poses, row: usize, alone: &mut Vec<Vec<usize>>) -> Outlier {
         let points: Vec<Option<Point3<f64>>> = self.tracks.iter().map(|track| track[row]).collect();
-        alone.push(self.explained_by_one(&points));
+        let explained = self.explained_by_one(&points);
+        // A body of which a reflection was taken for a marker neither bends nor has a loose marker.
+        if self.no_marker(&points, &explained).is_none() {
+            alone.push(explained);
+        }
         let (marker, off) = self.out_of_place(&points);
         Outlier {
             row: poses.rows[row],
@@ -206,21 +233,20 @@ impl<'a> Body<'a> {
         Some(moved.map(|k| self.markers[k]).collect())
     }
 
+    /// By how much the distances of a marker are off, m.
+    fn off(&self, points: &[Option<Point3<f64>>], marker: usize) -> f64 {
+        let own = self.pairs.iter();
+        let own = own.filter(|pair| pair.i == marker || pair.j == marker);
+        let departures = own.filter_map(|pair| {
+            Some(((points[pair.i]? - points[pair.j]?).norm() - pair.distance).abs())
+        });
+        median(departures.collect()).unwrap_or(0.0)
+    }
+
     /// The marker whose distances are most off, and by how much.
     fn out_of_place(&self, points: &[Option<Point3<f64>>]) -> (usize, f64) {
-        let off = |k: usize| {
-            let departures: Vec<f64> = self
-                .pairs
-                .iter()
-                .filter(|pair| pair.i == k || pair.j == k)
-                .filter_map(|pair| {
-                    Some(((points[pair.i]? - points[pair.j]?).norm() - pair.distance).abs())
-                })
-                .collect();
-            median(departures).unwrap_or(0.0)
-        };
         let worst = (0..self.markers.len())
-            .map(|k| (k, off(k)))
+            .map(|k| (k, self.off(points, k)))
             .max_by(|a, b| a.1.total_cmp(&b.1));
         worst.unwrap_or((0, 0.0))
     }

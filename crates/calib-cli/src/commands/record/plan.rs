@@ -31,7 +31,8 @@ pub(super) fn plan(
         }
         None => spec.ranges.iter().map(|(id, range)| (*id, *range)).unzip(),
     };
-    let poses = checked(options, guided.len())?;
+    let in_grid = if planned.is_some() { 0 } else { guided.len() };
+    let poses = checked(options, in_grid)?;
     let continuous = is_continuous(spec);
     let guide = Guide {
         joints: (0..guided.len()).collect(),
@@ -154,7 +155,7 @@ pub(super) fn check_options(
     Ok(())
 }
 
-/// Values of each joint and durations that make sense.
+/// Values of each joint of a grid, and durations, that make sense.
 fn checked(options: &Record, joints: usize) -> Result<usize, RecordError> {
     let poses = options.poses.unwrap_or(if joints == 1 { 11 } else { 6 });
     let count = poses.checked_pow(joints as u32).unwrap_or(usize::MAX);

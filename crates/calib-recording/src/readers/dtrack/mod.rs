@@ -19,11 +19,12 @@ mod fields;
 
 use fields::Fields;
 
-use super::common::{body_stream, head_text, pose, rotation, unexpected};
+use super::common::{body_stream, head_text, pose, unexpected};
 use super::{Input, ReadOptions, Reader};
 use crate::error::{At, Placed, Problem};
 use crate::growth::push;
 use crate::model::{BodyStream, MarkerSample, MarkerStream, Recording, Timeline};
+use crate::rotation::from_matrix;
 use crate::text::Lines;
 use crate::units::LengthUnit;
 use calib_finding::{Fact, Finding, Subject, catalog};
@@ -259,7 +260,7 @@ impl Log {
                 let matrix = Matrix3::from_column_slice(&matrix);
                 Some(pose(
                     point,
-                    rotation(At::Line(fields.line), &name, &matrix)?,
+                    from_matrix(At::Line(fields.line), &name, &matrix)?,
                 ))
             };
             self.body(fields.line, &name, track, quality)?;

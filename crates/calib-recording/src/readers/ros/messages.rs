@@ -2,7 +2,7 @@
 
 use super::cdr::Cdr;
 use crate::error::Placed;
-use crate::table::UNIT_TOLERANCE;
+use crate::rotation::UNIT_TOLERANCE;
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
 
 /// What one message says about streams that share their instants.

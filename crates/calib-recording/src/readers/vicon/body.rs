@@ -3,7 +3,8 @@
 use crate::error::{At, Placed, Problem};
 use crate::growth::push;
 use crate::model::BodyStream;
-use crate::readers::common::{Triplet, pose, quaternion, triplet, unexpected};
+use crate::readers::common::{Triplet, pose, triplet, unexpected};
+use crate::rotation::quaternion;
 use nalgebra::{UnitQuaternion, Vector3};
 
 /// A body that is being read.

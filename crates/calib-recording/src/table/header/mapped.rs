@@ -2,12 +2,13 @@
 
 use super::naming::length_unit;
 use super::{BodyPlan, Column, Layout, MarkerPlan, Rotation, SlotKind};
-use crate::column_map::{BodyColumns, ColumnMap, LongColumns};
+use crate::column_map::{BodyColumns, ColumnMap, LongColumns, RotationColumns};
 use crate::error::Problem;
 use crate::map_fault::{MapFault, StatedUnits, angle_unit};
 use crate::model::JointUnit;
 use crate::units::{AngleUnit, LengthUnit};
 use calib_finding::nearest_word;
+use std::ops::Range;
 
 /// Takes the columns that the map names into the layout and marks them in `mapped`.
 pub(super) fn apply(
@@ -92,16 +93,11 @@ impl Mapping<'_> {
         Ok(self.layout.slot(i, kind, scale))
     }
 
-    /// The slots of three columns of the tracker.
-    fn three(
-        &mut self,
-        what: &str,
-        columns: &[String; 3],
-        scale: impl Fn(&Self, &str) -> f64,
-    ) -> Result<[usize; 3], Problem> {
+    /// The slots of a position's columns.
+    fn place(&mut self, what: &str, columns: &[String; 3]) -> Result<[usize; 3], Problem> {
         let mut slots = [0; 3];
         for (slot, column) in slots.iter_mut().zip(columns) {
-            let scale = scale(self, column);
+            let scale = self.lengths(column);
             *slot = self.take(what, column, SlotKind::Tracker, scale)?;
         }
         Ok(slots)
@@ -171,7 +167,7 @@ impl Mapping<'_> {
     /// Markers by name, or the template of a long table.
     fn markers(&mut self, map: &ColumnMap) -> Result<(), Problem> {
         for (name, columns) in &map.markers {
-            let slots = self.three(&format!("marker `{name}`"), columns, Self::lengths)?;
+            let slots = self.place(&format!("marker `{name}`"), columns)?;
             self.layout.markers.push(MarkerPlan {
                 name: name.clone(),
                 slots,
@@ -179,7 +175,7 @@ impl Mapping<'_> {
         }
         let long = map.long.as_ref().and_then(|long| long.marker.as_ref());
         if let Some(columns) = long {
-            let slots = self.three("the markers", columns, Self::lengths)?;
+            let slots = self.place("the markers", columns)?;
             self.layout.markers.push(MarkerPlan {
                 name: String::new(),
                 slots,
@@ -194,7 +190,7 @@ impl Mapping<'_> {
         let long = map.long.as_ref().and_then(|long| long.body.as_ref());
         for (name, columns) in named.chain(long.map(|c| ("", c))) {
             let what = format!("body `{name}`");
-            let position = self.three(&what, &columns.position, Self::lengths)?;
+            let position = self.place(&what, &columns.position)?;
             let rotation = self.rotation(&what, columns)?;
             self.layout.bodies.push(BodyPlan {
                 name: name.to_string(),
@@ -208,30 +204,48 @@ impl Mapping<'_> {
 
     /// The one rotation of a body.
     fn rotation(&mut self, what: &str, columns: &BodyColumns) -> Result<Rotation, Problem> {
-        let count = columns.rotation_count();
-        let quaternion = match (&columns.quaternion_xyzw, &columns.quaternion_wxyz) {
-            _ if count != 1 => None,
-            (Some([x, y, z, w]), _) | (None, Some([w, x, y, z])) => Some(([x, y, z], w)),
-            (None, None) => None,
-        };
-        if let Some((vector, w)) = quaternion {
-            let [x, y, z] = self.three(what, &vector.map(String::clone), |_, _| 1.0)?;
-            let i = self.position(what, w)?;
-            let w = self.layout.slot(i, SlotKind::Tracker, 1.0);
-            return Ok(Rotation::Quaternion([x, y, z, w]));
-        }
-        let mut angles = |columns| self.three(what, columns, Self::body_angles);
-        match (&columns.rotation_vector, &columns.fixed_xyz, &columns.euler) {
-            (Some(vector), _, _) if count == 1 => Ok(Rotation::Vector(angles(vector)?)),
-            (_, Some(fixed), _) if count == 1 => Ok(Rotation::FixedXyz(angles(fixed)?)),
-            (_, _, Some(euler)) if count == 1 => {
-                Ok(Rotation::Euler(euler.axes, angles(&euler.columns)?))
-            }
-            _ => Err(Problem::ColumnMap(MapFault::Rotations {
+        let given: Vec<RotationColumns<'_>> = columns.rotations().collect();
+        let [given] = given[..] else {
+            return Err(Problem::ColumnMap(MapFault::Rotations {
                 path: vec![what.to_string()],
-                count,
-            })),
+                count: given.len(),
+            }));
+        };
+        let angles = given.angles();
+        Ok(match given {
+            RotationColumns::QuaternionXyzw(of) => {
+                Rotation::Quaternion(self.slots(what, of, angles)?)
+            }
+            RotationColumns::QuaternionWxyz(of) => {
+                let [w, x, y, z] = self.slots(what, of, angles)?;
+                Rotation::Quaternion([x, y, z, w])
+            }
+            RotationColumns::RotationVector(of) => Rotation::Vector(self.slots(what, of, angles)?),
+            RotationColumns::FixedXyz(of) => Rotation::FixedXyz(self.slots(what, of, angles)?),
+            RotationColumns::Euler(axes, of) => {
+                Rotation::Euler(axes, self.slots(what, of, angles)?)
+            }
+            RotationColumns::Matrix(of) => Rotation::Matrix(self.slots(what, of, angles)?),
+            RotationColumns::AxisAngle(of) => Rotation::AxisAngle(self.slots(what, of, angles)?),
+        })
+    }
+
+    /// The slots of a rotation's columns, of which these are `angles`.
+    fn slots<const N: usize>(
+        &mut self,
+        what: &str,
+        columns: &[String; N],
+        angles: Range<usize>,
+    ) -> Result<[usize; N], Problem> {
+        let mut slots = [0; N];
+        for (i, (slot, column)) in slots.iter_mut().zip(columns).enumerate() {
+            let scale = match angles.contains(&i) {
+                true => self.body_angles(column),
+                false => 1.0,
+            };
+            *slot = self.take(what, column, SlotKind::Tracker, scale)?;
         }
+        Ok(slots)
     }
 
     /// Names and frames of a long table.

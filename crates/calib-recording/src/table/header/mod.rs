@@ -15,6 +15,7 @@ use crate::model::JointUnit;
 use crate::table::stated_unit::{StatedUnit, UnitRow};
 use crate::units::TimeUnit;
 use std::collections::BTreeMap;
+use std::ops::Range;
 
 /// What is known of the robot beside a table.
 #[derive(Clone, Copy, Debug, Default)]
@@ -65,15 +66,29 @@ pub(super) enum Rotation {
     Vector([usize; 3]),
     FixedXyz([usize; 3]),
     Euler(EulerAxes, [usize; 3]),
+    /// Slots of a matrix, row by row.
+    Matrix([usize; 9]),
+    /// Slots of x, y, z of the axis, and of the angle.
+    AxisAngle([usize; 4]),
 }
 
 impl Rotation {
     pub(super) fn slots(&self) -> &[usize] {
         match self {
-            Rotation::Quaternion(slots) => slots,
+            Rotation::Quaternion(slots) | Rotation::AxisAngle(slots) => slots,
             Rotation::Vector(slots) | Rotation::FixedXyz(slots) | Rotation::Euler(_, slots) => {
                 slots
             }
+            Rotation::Matrix(slots) => slots,
+        }
+    }
+
+    /// Which of the slots are angles; the others have no unit.
+    pub(super) fn angles(&self) -> Range<usize> {
+        match self {
+            Rotation::Quaternion(_) | Rotation::Matrix(_) => 0..0,
+            Rotation::Vector(_) | Rotation::FixedXyz(_) | Rotation::Euler(..) => 0..3,
+            Rotation::AxisAngle(_) => 3..4,
         }
     }
 }

@@ -1,7 +1,7 @@
 //! The row of units below the header against the names of the columns and the column map.
 
 use super::naming::unit_in_name;
-use super::{Column, Layout, Rotation};
+use super::{Column, Layout};
 use crate::column_map::ColumnMap;
 use crate::error::{Against, At, Placed, Problem};
 use crate::model::{JointColumn, JointUnit};
@@ -165,16 +165,17 @@ impl Layout {
             .flatten()
             .for_each(|slot| add(slot, Quantity::Length));
         for body in &self.bodies {
-            let quantity = match body.rotation {
-                Rotation::Quaternion(_) => Quantity::None,
-                Rotation::Vector(_) | Rotation::FixedXyz(_) | Rotation::Euler(..) => {
-                    Quantity::Angle
-                }
-            };
-            body.rotation
-                .slots()
-                .iter()
-                .for_each(|slot| add(*slot, quantity));
+            let angles = body.rotation.angles();
+            for (i, slot) in body.rotation.slots().iter().enumerate() {
+                add(
+                    *slot,
+                    if angles.contains(&i) {
+                        Quantity::Angle
+                    } else {
+                        Quantity::None
+                    },
+                );
+            }
         }
         of
     }

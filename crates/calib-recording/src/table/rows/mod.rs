@@ -5,8 +5,6 @@ mod finish;
 mod of_pose;
 mod sample;
 
-pub(crate) use sample::UNIT_TOLERANCE;
-
 use self::of_pose::PoseRows;
 use super::header::{Column, Layout, SlotKind};
 use crate::column_map::ColumnMap;

@@ -4,12 +4,9 @@ use super::{Rows, State};
 use crate::error::{At, Placed, Problem};
 use crate::model::MarkerSample;
 use crate::placeholder::is_placeholder;
+use crate::rotation::{axis_angle, from_matrix, quaternion};
 use crate::table::header::{BodyPlan, Rotation};
-use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion, Vector3};
-
-/// How far a quaternion's length may be from 1. Four written decimals (NDI) give 1e-4; swapped or scaled columns
-/// give tenths.
-pub(crate) const UNIT_TOLERANCE: f64 = 5e-3;
+use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3};
 
 impl Rows<'_> {
     /// Name of a plan, or in a long table of the row's entity.
@@ -61,13 +58,13 @@ impl Rows<'_> {
         let BodyPlan {
             name,
             position,
-            rotation,
+            rotation: by,
             inverted,
         } = &self.layout.bodies[index];
         let inverted = *inverted;
         let name = self.name_of(name).to_string();
-        let slots = position.iter().chain(rotation.slots());
-        let needed = 3 + rotation.slots().len();
+        let slots = position.iter().chain(by.slots());
+        let needed = 3 + by.slots().len();
         let given = slots
             .clone()
             .filter(|&&slot| !self.values[slot].is_nan())
@@ -77,7 +74,7 @@ impl Rows<'_> {
         }
         // The pose of nothing has no position, and often the orientation of a frame that nobody turned.
         let missing = |slots: &[usize]| slots.iter().all(|&slot| self.values[slot].is_nan());
-        if missing(position) || missing(rotation.slots()) {
+        if missing(position) || missing(by.slots()) {
             self.halves.entry(name).or_default().push(line);
             return Ok(None);
         }
@@ -93,7 +90,7 @@ impl Rows<'_> {
             ));
         }
         if slots.clone().all(|&slot| self.values[slot] == 0.0)
-            && matches!(rotation, Rotation::Quaternion(_))
+            && matches!(by, Rotation::Quaternion(_) | Rotation::Matrix(_))
         {
             self.zeros.entry(name).or_default().push(line);
             return Ok(None);
@@ -105,21 +102,15 @@ impl Rows<'_> {
             return Ok(None);
         }
         let value = |slot: usize| self.values[slot];
-        let rotation = match rotation {
-            Rotation::Quaternion([x, y, z, w]) => {
-                let q = Quaternion::new(value(*w), value(*x), value(*y), value(*z));
-                let norm = q.norm();
-                if (norm - 1.0).abs() > UNIT_TOLERANCE {
-                    return Err((
-                        At::Line(line),
-                        Problem::NotUnit {
-                            body: name,
-                            norm,
-                            tolerance: UNIT_TOLERANCE,
-                        },
-                    ));
-                }
-                UnitQuaternion::from_quaternion(q)
+        let turned = match by {
+            Rotation::Quaternion(slots) => quaternion(At::Line(line), &name, slots.map(value))?,
+            Rotation::Matrix(slots) => {
+                let matrix = Matrix3::from_row_slice(&slots.map(value));
+                from_matrix(At::Line(line), &name, &matrix)?
+            }
+            Rotation::AxisAngle(slots) => {
+                let [x, y, z, angle] = slots.map(value);
+                axis_angle(At::Line(line), &name, Vector3::new(x, y, z), angle)?
             }
             Rotation::Vector(slots) => {
                 let [x, y, z] = slots.map(value);
@@ -132,7 +123,7 @@ impl Rows<'_> {
             Rotation::Euler(axes, slots) => axes.rotation(slots.map(value)),
         };
         let [x, y, z] = position.map(value);
-        let pose = Isometry3::from_parts(Translation3::new(x, y, z), rotation);
+        let pose = Isometry3::from_parts(Translation3::new(x, y, z), turned);
         Ok(Some(if inverted { pose.inverse() } else { pose }))
     }
 }
