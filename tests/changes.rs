@@ -365,6 +365,13 @@ fn frames_of_one_pose_count_once() {
     assert_eq!(found["severity"], "info");
     assert_eq!(found["facts"]["rows"], 320);
     assert_eq!(found["facts"]["poses"], 40);
+    // The noise of a mean is less than that which the profile states of a frame.
+    assert!(ran.words().contains("ACCEPTED"), "{}", ran.stdout);
+    let reasons = report["reason_ids"].as_array().expect("a list");
+    assert!(
+        !reasons.contains(&"noise-below-stated".into()),
+        "{reasons:?}"
+    );
     // The uncertainty is that of 40 poses, not of 320.
     let sigma = |report: &Value| -> Vec<f64> {
         let all = report["parameters"].as_array().expect("a list").iter();

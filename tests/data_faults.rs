@@ -558,7 +558,7 @@ fn rows_that_were_pasted_twice_count_once() {
 }
 
 /// In every fourth row a marker is its mirror image in a window behind the robot: the distances prove it, and the fit never sees it. Taken for errors of an
-/// incomplete model, such rows were readmitted, and the result was 289 mm off.
+/// incomplete model, such rows were readmitted.
 #[test]
 fn reflections_in_a_quarter_of_the_rows_are_left_out() {
     let tables = ["robots/ripley/arm_poses.csv", "robots/ripley/checks.csv"];
@@ -596,4 +596,36 @@ fn reflections_in_a_quarter_of_the_rows_are_left_out() {
         held_out.as_f64().is_some_and(|rms| rms < 8e-4),
         "{held_out}"
     );
+}
+
+/// A sweep that is listed twice: an origin keeps the recording that it is found from, whichever name comes first. Where origins use both, that is said.
+#[test]
+fn a_sweep_that_is_listed_twice_stays_with_its_origin() {
+    let dir = ripley();
+    let profile = dir.read(PROFILE);
+    let copy = |name: &str| {
+        let spec =
+            "file: ripley/wrist_sweep.csv, use: sweep, joints: {wrist_roll_deg: [-100, 100]}";
+        let line = format!("recordings:\n  {name}: {{{spec}}}\n");
+        profile.replacen("recordings:\n", &line, 1)
+    };
+    for name in ["a_copy", "z_copy"] {
+        let dir = ripley().file(PROFILE, copy(name));
+        let ran = dir.calib(["run", PROFILE, "--out", "out"]);
+        assert_eq!(ran.code, 0, "{}{}", ran.stdout, ran.stderr);
+        let words = ran.words();
+        assert!(words.contains("ACCEPTED WITH 1 WARNING"), "{name}: {words}");
+        assert!(
+            words.contains(&format!(
+                "{name}: 21 of 21 rows repeat rows of `wrist_sweep`"
+            )),
+            "{words}"
+        );
+    }
+    let again = "origins:\n  endK:\n    joint: wrist_roll\n    body: gripM\n    sweep: z_copy\n    axes: {x: wrist_roll}\n    orientation: {from: table}\n    point: {nominal_distance_from: base}\n";
+    let both = copy("z_copy").replacen("origins:\n", again, 1);
+    let found = findings(&ripley().file(PROFILE, both), PROFILE);
+    let named = found.iter().find(|f| f["id"] == "rows-repeated");
+    let named = named.unwrap_or_else(|| panic!("{found:#?}"));
+    assert!(named.to_string().contains("count twice"), "{named:#}");
 }

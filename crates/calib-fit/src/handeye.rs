@@ -179,34 +179,29 @@ fn by_prefix(prefix: &str) -> [BodyColumns; 3] {
     ]
 }
 
-/// The poses in the notations that the table has; without one of them, what is missing of the first.
+/// The poses in the notations that the table has; where it has none, what is missing of the first.
 fn read_by_names(table: &Measured, robot: &str, measured: &str) -> Result<Poses, FitError> {
-    let mut missing = None;
-    for of_robot in by_prefix(robot) {
-        for of_measured in by_prefix(measured) {
-            let bodies = [
-                (robot.to_owned(), of_robot.clone()),
-                (measured.to_owned(), of_measured),
-            ];
-            let options = ReadOptions {
-                columns: Some(ColumnMap {
-                    bodies: bodies.into(),
-                    ..ColumnMap::default()
-                }),
-                ..ReadOptions::default()
-            };
-            match table.poses(&options) {
-                Err(FitError::Recording(e))
-                    if matches!(*e.problem, Problem::MissingColumn { .. }) =>
-                {
-                    missing.get_or_insert(e);
-                }
-                read => return read,
-            }
-        }
-    }
-    // There is a notation, so that something was missing.
-    missing.map_or_else(|| table.poses(&ReadOptions::default()), |e| Err(e.into()))
+    let read = |of_robot: &BodyColumns, of_measured: &BodyColumns| {
+        let bodies = [(robot, of_robot), (measured, of_measured)];
+        let bodies = bodies.map(|(name, columns)| (name.to_owned(), columns.clone()));
+        table.poses(&ReadOptions {
+            columns: Some(ColumnMap {
+                bodies: bodies.into(),
+                ..ColumnMap::default()
+            }),
+            ..ReadOptions::default()
+        })
+    };
+    let is_there = |read: &Result<Poses, FitError>| match read {
+        Err(FitError::Recording(e)) => !matches!(*e.problem, Problem::MissingColumn { .. }),
+        _ => true,
+    };
+    let (robots, bodies) = (by_prefix(robot), by_prefix(measured));
+    let mut pairs = robots
+        .iter()
+        .flat_map(|a| bodies.iter().map(move |b| (a, b)));
+    let found = pairs.find_map(|(a, b)| Some(read(a, b)).filter(is_there));
+    found.unwrap_or_else(|| read(&robots[0], &bodies[0]))
 }
 
 /// `rows`: of the poses, in the file.

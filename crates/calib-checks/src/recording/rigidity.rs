@@ -109,7 +109,7 @@ pub fn out_of_place(poses: &Poses, expected: &Expectations) -> Vec<(String, usiz
             continue;
         };
         if body.redefined(poses).is_none() && body.loose_markers().is_empty() {
-            found.extend(body.gross(poses.len()));
+            found.extend(body.reflections(poses.len()));
         }
     }
     found

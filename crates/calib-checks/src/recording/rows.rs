@@ -56,13 +56,13 @@ pub fn copied_rows(all: &[&Poses]) -> Vec<Copied> {
     found
 }
 
-/// What is said of rows that are copies of others of their own recording, or of `others`.
+/// What is said of rows that are copies of others of their own recording, or of `others`; `used`: they take part all the same.
 #[must_use]
-pub fn repeated_rows(poses: &Poses, rows: &[usize], others: &[&str]) -> Finding {
-    let kind = if others.is_empty() {
-        "within"
-    } else {
-        "recordings"
+pub fn repeated_rows(poses: &Poses, rows: &[usize], others: &[&str], used: bool) -> Finding {
+    let kind = match (others.is_empty(), used) {
+        (true, _) => "within",
+        (false, false) => "recordings",
+        (false, true) => "origins",
     };
     Finding::of_kind(catalog::ROWS_REPEATED, kind, Subject::default())
         .with("repeated", Fact::count(rows.len()))
@@ -79,7 +79,7 @@ pub(super) fn repeated(poses: &Poses) -> Option<Finding> {
     let found = copied_rows(&[poses]);
     found
         .first()
-        .map(|copied| repeated_rows(poses, &copied.rows, &[]))
+        .map(|copied| repeated_rows(poses, &copied.rows, &[], false))
 }
 
 /// All values of a row, bit by bit; `None` where nothing was tracked.

@@ -42,6 +42,9 @@ super::topic! {
         "recordings": Warning,
             "{repeated} of {rows:row} repeat rows of {of:code} in every joint and every tracked value. They are copies of the same measurements and were left out.",
             "Remove the recording from the profile, or the copies from its file: counted twice, they would make the uncertainties too small.";
+        "origins": Warning,
+            "{repeated} of {rows:row} repeat rows of {of:code} in every joint and every tracked value. Origins are found from both recordings, so that the same measurements count twice and the uncertainties are too small.",
+            "Name one of the recordings as the `sweep` of all these origins, and remove the other one from the profile.";
     }
     /// A table with more rows than the tracker has frames.
     FRAMES_REPEATED = "frames-repeated" {

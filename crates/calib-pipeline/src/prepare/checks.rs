@@ -119,7 +119,7 @@ fn fewest_poses(inputs: &Inputs, loaded: &Loaded) -> usize {
     let copies = copies.filter(|out| out.recording == loaded.name);
     let copies: BTreeSet<usize> = copies.map(|out| out.row).collect();
     match loaded.spec.usage {
-        // What it says is said by another recording.
+        // Its measurements are in another recording.
         _ if !copies.is_empty() && copies.len() == loaded.poses.len() => 0,
         Usage::Validation => 1,
         Usage::Static if poses >= MIN_POSES => 1,

@@ -16,8 +16,10 @@ pub(super) fn leave_out(inputs: &mut Inputs) {
     let is_held_out = |loaded: &&&Loaded| loaded.spec.usage == Usage::Validation;
     let (held_out, mut fitted): (Vec<&Loaded>, Vec<&Loaded>) =
         all.iter().partition(|loaded| is_held_out(loaded));
-    // A sweep is asked for; its rows among those of random poses are the copies.
-    fitted.sort_by_key(|loaded| loaded.spec.usage != Usage::Sweep);
+    let origins = &inputs.robot.profile.origins;
+    let is_swept = |loaded: &Loaded| origins.values().any(|origin| origin.sweep == loaded.name);
+    // What an origin is found from is needed where it is: its rows in other recordings are the copies.
+    fitted.sort_by_key(|loaded| !is_swept(loaded));
     // What is held out and copied from what is fitted is another matter.
     let groups = held_out.into_iter().map(|loaded| vec![loaded]);
     let groups = std::iter::once(fitted).chain(groups);
@@ -28,16 +30,19 @@ pub(super) fn leave_out(inputs: &mut Inputs) {
             let own = group[copied.recording];
             let others = copied.of.iter().filter(|of| **of != copied.recording);
             let others: Vec<&str> = others.map(|of| group[*of].name.as_str()).collect();
-            findings.push(of(own, &copied.rows, &others));
-            excluded.extend(measurements(own, &copied.rows));
+            let used = is_swept(own) && !others.is_empty();
+            findings.push(of(own, &copied.rows, &others, used));
+            if !used {
+                excluded.extend(measurements(own, &copied.rows));
+            }
         }
     }
     inputs.exclude(excluded);
     inputs.findings.extend(findings);
 }
 
-fn of(own: &Loaded, rows: &[usize], others: &[&str]) -> Finding {
-    repeated_rows(&own.poses, rows, others).in_recording(&own.name)
+fn of(own: &Loaded, rows: &[usize], others: &[&str], used: bool) -> Finding {
+    repeated_rows(&own.poses, rows, others, used).in_recording(&own.name)
 }
 
 /// Everything that the tracker saw in these rows.

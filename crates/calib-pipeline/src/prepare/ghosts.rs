@@ -12,8 +12,7 @@ use crate::prepare::inputs::Inputs;
 
 /// Takes the markers out that are grossly out of place, where the checks of the data found some.
 pub fn take_out(inputs: &mut Inputs, findings: &[Finding]) {
-    let mut names = [catalog::MARKER_OUTLIER, catalog::NOT_RIGID].into_iter();
-    if !names.any(|id| findings.iter().any(|f| f.id == id)) {
+    if findings.iter().all(|f| f.id != catalog::MARKER_OUTLIER) {
         return;
     }
     let mut excluded = Vec::new();

@@ -84,19 +84,19 @@ impl<'a> Body<'a> {
         findings
     }
 
-    /// Markers that are grossly out of place, with their rows.
-    pub(super) fn gross(&self, rows: usize) -> Vec<(String, usize)> {
+    /// Markers in whose place a reflection was seen, with their rows.
+    pub(super) fn reflections(&self, rows: usize) -> Vec<(String, usize)> {
         let of_row = |row: usize| {
             let points: Vec<Option<Point3<f64>>> =
                 self.tracks.iter().map(|track| track[row]).collect();
-            let marker = self.no_marker(&points, &self.explained_by_one(&points))?;
+            let marker = self.reflection(&points, &self.explained_by_one(&points))?;
             Some((self.markers[marker].to_owned(), row))
         };
         (0..rows).filter_map(of_row).collect()
     }
 
     /// The marker that is farther off than the body is long, where it `alone` explains a row: no marker moves so far on its body.
-    fn no_marker(&self, points: &[Option<Point3<f64>>], alone: &[usize]) -> Option<usize> {
+    fn reflection(&self, points: &[Option<Point3<f64>>], alone: &[usize]) -> Option<usize> {
         let [marker] = *alone else { return None };
         let longest = self.pairs.iter().map(|pair| pair.distance);
         let longest = longest.fold(self.tolerance, f64::max);
@@ -109,7 +109,7 @@ impl<'a> Body<'a> {
         let points: Vec<Option<Point3<f64>>> = self.tracks.iter().map(|track| track[row]).collect();
         let explained = self.explained_by_one(&points);
         // A body of which a reflection was taken for a marker neither bends nor has a loose marker.
-        if self.no_marker(&points, &explained).is_none() {
+        if self.reflection(&points, &explained).is_none() {
             alone.push(explained);
         }
         let (marker, off) = self.out_of_place(&points);
@@ -367,6 +367,36 @@ mod tests {
             }
             let swaps = found(&poses).iter().any(|f| f.id == catalog::MARKER_SWAP);
             assert!(!swaps, "seed {seed}");
+        }
+    }
+
+    /// A third of the rows has a reflection in the place of one of three, four or five markers: these and no others are found, also where the same
+    /// marker is always the one; a marker that slips by less than its body is long is none.
+    #[test]
+    fn reflections_are_found_with_their_rows() {
+        for count in 3..=5 {
+            for seed in 0..20 {
+                let mut rng = ChaCha8Rng::seed_from_u64(seed);
+                let always = seed % 2 == 0;
+                let slips = |k: usize, row: usize| match k == 1 && row % 10 == 1 {
+                    true => Vector3::from(PLACES[k]) + Vector3::new(0.0, 0.0, 0.02),
+                    false => Vector3::from(PLACES[k]),
+                };
+                let mut poses = body(count, slips, 1e-4, &mut rng);
+                let mut expected = Vec::new();
+                for row in (0..ROWS).step_by(3).filter(|row| row % 10 != 1) {
+                    let marker = format!("m{}", if always { 0 } else { row % count });
+                    let seen = poses.markers.get_mut(&marker).expect("there")[row].as_mut();
+                    seen.expect("seen").z += rng.random_range(0.5..2.0);
+                    expected.push((marker, row));
+                }
+                let known = Expectations {
+                    bodies: [("hand".to_owned(), poses.markers.keys().cloned().collect())].into(),
+                    ..Expectations::default()
+                };
+                let reflections = super::super::out_of_place(&poses, &known);
+                assert_eq!(reflections, expected, "{count} {seed}");
+            }
         }
     }
 
