@@ -176,6 +176,59 @@ fn holds_with_two_clocks_become_poses() {
     assert!((offset - OFFSET).abs() < 2e-3, "{offset}");
 }
 
+/// In every fourth frame a marker is its mirror image in a window: what is seen of the robot stands still all the same, and the means of the holds contain
+/// no reflection.
+#[test]
+fn holds_are_found_beside_reflections() {
+    let robot = ripley();
+    let motion = Motion::StopAndGo {
+        hold: 1.2,
+        travel: 1.3,
+    };
+    let plan = plan(&robot, motion, 75.0);
+    let mut streams =
+        simulate_streams(&robot.profile, &robot.model, &plan, SEED).expect("a section");
+    let ghosts = streams.tracker.markers.get_mut("gripM_3");
+    for point in ghosts
+        .expect("of the robot")
+        .iter_mut()
+        .step_by(4)
+        .flatten()
+    {
+        point.y = 2.6 - point.y;
+    }
+    let dir = with_streams(&streams, "{poses: settle, hold_s: 0.8}");
+    let report = run(&dir);
+    is_true(&dir, &report);
+    let found = report["findings"].as_array().expect("a list");
+    assert!(
+        found.iter().any(|f| f["id"] == "marker-outlier"),
+        "{found:#?}"
+    );
+    assert!(found.iter().all(|f| f["severity"] != "error"), "{found:#?}");
+}
+
+/// No column of the tracker's stream has a name of the profile: that is said, and nothing of the clocks, which no body could tell.
+#[test]
+fn a_stream_without_a_body_of_the_profile_is_named_as_such() {
+    let robot = ripley();
+    let plan = plan(&robot, Motion::Continuous, 20.0);
+    let mut streams =
+        simulate_streams(&robot.profile, &robot.model, &plan, SEED).expect("a section");
+    let renamed = std::mem::take(&mut streams.tracker.markers).into_iter();
+    streams.tracker.markers = renamed
+        .map(|(name, track)| (format!("cell_{name}"), track))
+        .collect();
+    let dir = with_streams(&streams, "{poses: continuous}");
+    let refused = dir.calib(["check", "robots/ripley.yaml"]);
+    assert_eq!(refused.code, 3, "{}", refused.stdout);
+    let said = &refused.stderr;
+    assert!(
+        said.contains("has no column of") && said.contains("Did you mean `cell_"),
+        "{said}"
+    );
+}
+
 #[test]
 fn a_declared_clock_is_believed_and_an_undeclared_one_is_not() {
     let robot = ripley();

@@ -2,7 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
-use calib_checks::rigid_body::rigid_groups_of_files;
+use calib_checks::rigid_body::{is_pose_of, rigid_groups_of_files};
 use calib_recording::{BodyStream, ColumnMap, Filled, MarkerStream};
 use calib_urdf::RobotModel;
 use nalgebra::Point3;
@@ -49,7 +49,7 @@ pub fn bodies(
     let names: Vec<&String> = tracks.keys().collect();
     let slices: Vec<&[Option<Point3<f64>>]> = tracks.values().map(Vec::as_slice).collect();
     // A tracked pose keeps its name.
-    let posed: BTreeSet<String> = streams(sources).map(|body| body.name.clone()).collect();
+    let mut posed: BTreeSet<String> = streams(sources).map(|body| body.name.clone()).collect();
     let mut taken = posed.clone();
     taken.extend(known.iter().cloned());
     let mut found = Vec::new();
@@ -61,7 +61,16 @@ pub fn bodies(
     {
         let mut markers: Vec<String> = group.iter().map(|m| names[*m].clone()).collect();
         let of_group: Vec<&[Option<Point3<f64>>]> = group.iter().map(|m| slices[*m]).collect();
-        let name = free(model, body_name(&markers), &mut taken);
+        let pose = pose_of(sources, &markers).filter(|pose| !known.contains(pose));
+        if let Some(pose) = pose.filter(|pose| posed.remove(pose)) {
+            taken.remove(&pose);
+            facts.push(Fact::new(
+                Place::Recordings,
+                About::PoseOfMarkers { body: pose },
+            ));
+        }
+        let own = device_body(sources, &markers).unwrap_or_else(|| body_name(&markers));
+        let name = free(model, own, &mut taken);
         let place = Place::Body(name.clone());
         let about = if markers.len() < 3 {
             About::Points {
@@ -102,6 +111,49 @@ pub fn bodies(
     };
     facts.push(Fact::new(Place::Tracker, about));
     (found, facts)
+}
+
+/// The body that the tracker counts all these markers to.
+fn device_body(sources: &[Source], markers: &[String]) -> Option<String> {
+    let all = sources.iter().flat_map(|s| &s.recording.markers);
+    let own = all.filter(|m| markers.contains(&m.name) && !m.unlabeled);
+    let mut bodies = own.map(|m| m.body.as_ref());
+    let first = bodies.next()??;
+    bodies
+        .all(|body| body == Some(first))
+        .then(|| first.clone())
+}
+
+/// The tracked pose that was computed from these markers: the tracker counts them to it, or the pose is their least-squares fit.
+fn pose_of(sources: &[Source], markers: &[String]) -> Option<String> {
+    if markers.len() < 3 {
+        return None;
+    }
+    let by_name = device_body(sources, markers);
+    let mut names: BTreeSet<&String> = streams(sources).map(|body| &body.name).collect();
+    names.retain(|name| {
+        by_name.as_ref() == Some(name) || sources.iter().any(|source| is_fit(source, name, markers))
+    });
+    names.first().map(|name| (*name).clone())
+}
+
+/// Whether the pose is the least-squares fit of the markers in this file.
+fn is_fit(source: &Source, pose: &str, markers: &[String]) -> bool {
+    let recording = &source.recording;
+    let Some(body) = recording.bodies.iter().find(|b| b.name == *pose) else {
+        return false;
+    };
+    let track = |name: &String| {
+        let marker = recording.markers.iter().find(|m| m.name == *name)?;
+        let of_body = marker.timeline == body.timeline;
+        let points = marker.samples.iter().map(|s| s.point(Filled::Exclude));
+        of_body.then(|| points.collect::<Track>())
+    };
+    let tracks: Option<Vec<Track>> = markers.iter().map(track).collect();
+    tracks.is_some_and(|tracks| {
+        let slices: Vec<&[Option<Point3<f64>>]> = tracks.iter().map(Vec::as_slice).collect();
+        is_pose_of(&body.tracker_from_body, &slices)
+    })
 }
 
 fn streams(sources: &[Source]) -> impl Iterator<Item = &BodyStream> {

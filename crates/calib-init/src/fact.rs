@@ -2,6 +2,7 @@
 
 mod guess;
 mod how;
+mod place;
 mod turns;
 
 use calib_recording::{AngleUnit, LengthUnit, TimeUnit};
@@ -10,27 +11,8 @@ use serde::Serialize;
 use crate::mistake::Mistake;
 
 pub use how::{AngleHow, LengthHow};
+pub use place::Place;
 pub use turns::{Notation, TurnsHow};
-
-/// What a fact is about: a part of the profile.
-#[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Place {
-    /// The robot.
-    Robot,
-    /// The tracker and its noise.
-    Tracker,
-    /// A body, by name.
-    Body(String),
-    /// All recordings together.
-    Recordings,
-    /// A recording, by name.
-    Recording(String),
-    /// The limits of the verdict.
-    Limits,
-    /// The simulated recordings.
-    Simulate,
-}
 
 /// Residuals of the registration of all recordings to the nominal robot, rms, m.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -224,6 +206,11 @@ pub enum About {
         marker: String,
         /// The one that it repeats.
         of: String,
+    },
+    /// A tracked pose that was computed from markers which are recorded too: left out.
+    PoseOfMarkers {
+        /// The tracked body.
+        body: String,
     },
     /// A body that fits the nominal robot closer than the tracker lets any measured body: left out.
     Computed {

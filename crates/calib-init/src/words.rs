@@ -375,6 +375,9 @@ fn of_session(about: &About) -> String {
             format!("`{marker}` repeats `{of}` in every row and is left out.")
         }
         About::Computed { .. } => of_computed(about),
+        About::PoseOfMarkers { body } => {
+            format!("The pose of `{body}` is computed from markers that are recorded too. It is left out: the same measurements would count twice.")
+        }
         About::Seldom { markers } => {
             format!("Seen in fewer than four rows and left out: {}.", quoted(markers))
         }

@@ -160,6 +160,7 @@ impl DataCheck {
                 catalog::BODY_NOT_RIGID,
                 catalog::BODY_REDEFINED,
                 catalog::BODY_CONDENSED,
+                catalog::POSE_OF_MARKERS,
                 catalog::MARKER_SWAP,
                 catalog::MARKER_SWAP_REPAIRED,
                 catalog::MARKER_OUTLIER,

@@ -22,6 +22,7 @@ mod gross;
 mod groups;
 mod learn;
 mod pose;
+mod same;
 
 pub use computed::computed_below;
 pub(crate) use computed::decimal_grid;
@@ -29,3 +30,4 @@ pub use gross::Distances;
 pub use groups::{rigid_groups, rigid_groups_of_files};
 pub use learn::{MarkerFit, NotABody, Template};
 pub use pose::{BodyPoses, RowPose, WithoutPose, body_from_markers, body_poses};
+pub use same::is_pose_of;

@@ -46,6 +46,12 @@ super::topic! {
             "The distances between {markers} scatter by at most {scatter:um}.",
             "Export the measured markers, or use these points as one body pose: they were computed from a fitted body.";
     }
+    /// A pose and the markers that the tracker computed it from both take part.
+    POSE_OF_MARKERS = "pose-of-markers" {
+        "": Warning,
+            "The pose of {body:code} is the least-squares fit of the markers of {other:code}: the tracker computed it from them. Both take part, so the same measurements count twice and the uncertainties come out too small, by a factor of up to 1.4.",
+            "Remove the line of {body:code} from `bodies` and keep the markers: they show the tracker's noise.";
+    }
     /// A marker or body is lost in most rows.
     MANY_LOST = "many-lost" {
         "": Warning,

@@ -131,6 +131,14 @@ pub enum DataProblem {
         /// What was found.
         why: Box<Finding>,
     },
+    /// A stream with no body of the profile.
+    #[error("recording `{recording}`: {}", why.text())]
+    NoBody {
+        /// The recording.
+        recording: String,
+        /// What was found.
+        why: Box<Finding>,
+    },
     /// No hold.
     #[error("recording `{recording}`: nothing stands still for {hold} s")]
     NothingStandsStill {
@@ -238,7 +246,7 @@ impl DataProblem {
             Self::NoTrackerTime => "add a column `t_s`, or remove `timing`: static poses need none",
             Self::NoJointTime => "add a column `t_s` to the robot's log",
             Self::NotATrack(_) => "give every stream a name of its own",
-            Self::Clocks { why, .. } => return why.remedy(),
+            Self::Clocks { why, .. } | Self::NoBody { why, .. } => return why.remedy(),
             Self::NothingStandsStill { .. } => {
                 "hold each posture for a second, or take rows of the motion: `timing: {poses: continuous}`"
             }

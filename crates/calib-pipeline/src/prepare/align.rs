@@ -26,6 +26,7 @@ use crate::error::{DataProblem, PipelineError};
 use crate::prepare::aligned::{Aligned, Alignment, ClockState, SAME_TIME};
 use crate::prepare::blanks;
 use crate::prepare::fresh::only_fresh;
+use crate::prepare::ghosts;
 use crate::prepare::inputs::RobotProfile;
 use crate::prepare::levers::as_seen;
 use crate::prepare::repeats::JITTER;
@@ -33,6 +34,7 @@ use crate::prepare::row_noise::RowNoise;
 use crate::prepare::settled::settle;
 use crate::prepare::streams::Scalars;
 use crate::prepare::timelines::{estimate, tracker_table, tracker_timeline};
+use crate::prepare::untracked;
 
 /// Half of the time over which a joint's speed is measured, s: several samples of any controller.
 pub(crate) const HALF_CHORD: f64 = 0.02;
@@ -99,13 +101,7 @@ fn aligned(
     recording: &Recording,
 ) -> Result<Aligned, DataProblem> {
     let mut streams = Streams::of(recording)?;
-    for (joint, late) in &timing.late {
-        let joint = robot.model.joint(*joint).name.clone();
-        match streams.joints.get_mut(&joint) {
-            Some(stream) => stream.was_late(*late),
-            None => return Err(DataProblem::LateJointNotRecorded { joint }),
-        }
-    }
+    streams.were_late(robot, timing)?;
     let joints = streams.joints.iter();
     blanks::none_is_empty(joints.map(|(joint, stream)| (joint, stream.values.as_slice())))?;
     let mut full =
@@ -118,14 +114,21 @@ fn aligned(
         .chain(blanks::of_streams(name, &streams.joints, streams.line))
         .chain(repeated)
         .collect();
+    if let Some(finding) = untracked::shows_none(&robot.profile, name, &full) {
+        return Err(DataProblem::NoBody {
+            recording: name.to_owned(),
+            why: Box::new(finding),
+        });
+    }
+    let (seen, reflections) = ghosts::of_stream(&robot.profile, &full);
     let clocks = match streams.stated_clocks(timing) {
         Some(ClockState::OneWithLag { .. }) => ClockState::OneWithLag {
-            start: large_lag(robot, spec, timing, (&full, &streams.joints)),
+            start: large_lag(robot, spec, timing, (&seen, &streams.joints)),
         },
         Some(stated) => stated,
         None => {
             let (body, map) =
-                estimate(robot, spec, timing, &full, &streams.joints).map_err(|why| {
+                estimate(robot, spec, timing, &seen, &streams.joints).map_err(|why| {
                     DataProblem::Clocks {
                         recording: name.to_owned(),
                         why,
@@ -139,16 +142,13 @@ fn aligned(
             ClockState::Found { body, map }
         }
     };
-    let velocities = streams.add_robot(&mut full, &clocks);
-    // A robot that starts, stops or turns fast is no jump of the track: its joints say so once both are on one time line.
-    if findings.iter().any(|f| f.id == catalog::JUMP) {
-        let again = checks(&full, &Expectations::default());
-        let still = |f: &Finding| {
-            let same = |a: &Finding| a.id == f.id && a.subject.about == f.subject.about;
-            f.id != catalog::JUMP || again.iter().any(same)
-        };
-        findings.retain(still);
+    // Rows of a motion are checked one by one; a mean would contain what is false in its samples.
+    if timing.poses == TimedPoses::Settle && !reflections.is_empty() {
+        full = seen.into_owned();
+        findings.extend(reflections.into_iter().map(|f| f.in_recording(name)));
     }
+    let velocities = streams.add_robot(&mut full, &clocks);
+    keep_jumps_beside_joints(&full, &mut findings);
     let mut aligned = Aligned {
         poses: Poses::default(),
         velocities: BTreeMap::new(),
@@ -191,6 +191,18 @@ fn aligned(
     Ok(aligned)
 }
 
+/// A robot that starts, stops or turns fast is no jump of the track: its joints say so once both are on one time line.
+fn keep_jumps_beside_joints(full: &Poses, findings: &mut Vec<Finding>) {
+    if findings.iter().all(|f| f.id != catalog::JUMP) {
+        return;
+    }
+    let again = checks(full, &Expectations::default());
+    findings.retain(|f| {
+        let same = |a: &Finding| a.id == f.id && a.subject.about == f.subject.about;
+        f.id != catalog::JUMP || again.iter().any(same)
+    });
+}
+
 impl<'a> Streams<'a> {
     fn of(recording: &'a Recording) -> Result<Self, DataProblem> {
         let line = tracker_timeline(recording).ok_or(DataProblem::NothingTracked)?;
@@ -213,6 +225,18 @@ impl<'a> Streams<'a> {
             tracker_clock: &tracker.clock,
             robot_clock,
         })
+    }
+
+    /// Puts joints whose values were read late at the times that they are of.
+    fn were_late(&mut self, robot: &RobotProfile, timing: &Timing) -> Result<(), DataProblem> {
+        for (joint, late) in &timing.late {
+            let joint = robot.model.joint(*joint).name.clone();
+            match self.joints.get_mut(&joint) {
+                Some(stream) => stream.was_late(*late),
+                None => return Err(DataProblem::LateJointNotRecorded { joint }),
+            }
+        }
+        Ok(())
     }
 
     /// Leaves the rows in which the tracker measured; what was found.

@@ -7,7 +7,7 @@ use calib_checks::rigid_body::Template;
 use calib_checks::{Expectations, checks, held_out_in_training, other_scales, other_shapes};
 use calib_core::effect::{Drives, Effect, Source};
 use calib_finding::{About, Fact, Finding, Severity, Subject, Unit, catalog};
-use calib_profile::{BodyKind, Contact, Free, JointFree, Load, Usage};
+use calib_profile::{BodyKind, Contact, Free, JointFree, Load, Profile, Usage};
 use calib_recording::Poses;
 use calib_report::RejectedFor;
 use calib_urdf::{JointId, JointKind, RobotModel};
@@ -230,28 +230,36 @@ fn followers(model: &RobotModel, loaded: &Loaded) -> BTreeMap<String, [f64; 2]> 
     out
 }
 
+/// The markers of each body that the table shows, and the templates that are stated of them.
+pub(super) fn of_markers(
+    profile: &Profile,
+    poses: &Poses,
+) -> (BTreeMap<String, Vec<String>>, BTreeMap<String, Template>) {
+    let (mut bodies, mut templates) = (BTreeMap::new(), BTreeMap::new());
+    for (body, spec) in &profile.bodies {
+        let BodyKind::Markers { names, template } = &spec.kind else {
+            continue;
+        };
+        if !names.iter().any(|m| poses.markers.contains_key(m)) {
+            continue;
+        }
+        bodies.insert(body.clone(), names.clone());
+        if let Some(points) = template {
+            let template = Template {
+                names: names.clone(),
+                points: points.clone(),
+            };
+            templates.insert(body.clone(), template);
+        }
+    }
+    (bodies, templates)
+}
+
 pub(crate) fn expectations(inputs: &Inputs, loaded: &Loaded) -> Expectations {
     let model = &inputs.robot.model;
     let profile = &inputs.robot.profile;
     let name = |id: &calib_urdf::JointId| model.joint(*id).name.clone();
-    let mut bodies = BTreeMap::new();
-    let mut templates = BTreeMap::new();
-    for (body, spec) in &profile.bodies {
-        if let BodyKind::Markers { names, template } = &spec.kind
-            && names.iter().any(|m| loaded.poses.markers.contains_key(m))
-        {
-            bodies.insert(body.clone(), names.clone());
-            if let Some(points) = template {
-                templates.insert(
-                    body.clone(),
-                    Template {
-                        names: names.clone(),
-                        points: points.clone(),
-                    },
-                );
-            }
-        }
-    }
+    let (bodies, templates) = of_markers(profile, &loaded.poses);
     Expectations {
         bodies,
         templates,

@@ -18,7 +18,7 @@ use crate::prepare::inputs::stated_sights;
 use crate::prepare::robot::urdf_warnings;
 use crate::prepare::rows::prepare;
 use crate::prepare::timelines::{with_robot_log, with_robot_rows};
-use crate::prepare::{effects, named, readers};
+use crate::prepare::{effects, named, readers, twice};
 
 pub use crate::prepare::excluded::Excluded;
 pub use crate::prepare::inputs::{Digest, Inputs, Loaded, RobotProfile};
@@ -108,6 +108,7 @@ pub fn load_recordings_with(
     };
     inputs.exclude(excluded);
     copied::leave_out(&mut inputs);
+    inputs.findings.extend(twice::findings(&inputs));
     inputs.findings.extend(named::unused(&inputs));
     effects::evaluate(&inputs)?;
     Ok(inputs)

@@ -36,5 +36,6 @@ pub mod stopped;
 pub mod streams;
 pub mod timelines;
 pub mod tracks;
+mod twice;
 mod unknown;
 mod untracked;

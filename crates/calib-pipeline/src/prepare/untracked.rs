@@ -1,7 +1,8 @@
 //! Bodies that a recording has to show and does not name: its rows would count for nothing, without a word.
 
 use calib_finding::{Fact, Finding, Subject, catalog, nearest_word};
-use calib_profile::{Body, BodyKind, Usage};
+use calib_profile::{Body, BodyKind, Profile, Usage};
+use calib_recording::Poses;
 
 use crate::prepare::inputs::{Inputs, Loaded};
 
@@ -12,47 +13,19 @@ use crate::prepare::inputs::{Inputs, Loaded};
 pub(super) fn missing_bodies(inputs: &Inputs, loaded: &Loaded) -> Vec<Finding> {
     let profile = &inputs.robot.profile;
     let poses = &loaded.poses;
-    let columns = || poses.markers.keys().chain(poses.bodies.keys());
-    if columns().next().is_none() {
+    if columns(poses).next().is_none() {
         return Vec::new();
     }
-    let has = |name: &String| has_column(loaded, name);
-    let mut contacts = profile.contacts.values();
-    let touched = contacts.any(|contact| contact.recordings.contains(&loaded.name));
+    let has = |name: &String| has_column(poses, name);
+    let touched = is_touched(profile, &loaded.name);
     let shown = |name: &String, body: &Body| names(name, body).any(has);
-    let known: Vec<&str> = columns().map(String::as_str).collect();
-    // A column of another body is not what was meant.
-    let all = || {
-        profile
-            .bodies
-            .iter()
-            .flat_map(|(name, body)| names(name, body))
-    };
-    let free: Vec<&str> = known
-        .iter()
-        .copied()
-        .filter(|column| !all().any(|name| name == column))
-        .collect();
-    let near = |name: &String, body: &Body| {
-        let first = names(name, body).next()?;
-        let longer = || free.iter().copied().find(|c| c.ends_with(first.as_str()));
-        nearest_word(first, free.iter().copied()).or_else(longer)
-    };
-    let finding = |kind, subject, bodies: &[(&String, &Body)]| {
-        let near: Vec<&str> = bodies.iter().filter_map(|(n, b)| near(n, b)).collect();
-        Finding::of_kind(catalog::MISSING_BODY, kind, subject)
-            .with(
-                "bodies",
-                Fact::names(bodies.iter().map(|(name, _)| name.as_str())),
-            )
-            .with("known", Fact::names(known.iter().copied()))
-            .with_some("nearest", (!near.is_empty()).then(|| Fact::names(near)))
-    };
+    let free = free(profile, poses);
+    let finding = |kind, subject, bodies: &[_]| missing((kind, subject), bodies, poses, &free);
     // What no fitted recording shows is named with its cause where its tracks are needed.
     let fitted = |r: &&Loaded| r.spec.usage != Usage::Validation;
     let elsewhere = |(name, body): &(&String, &Body)| {
         let mut others = inputs.recordings.values().filter(fitted);
-        others.any(|r| names(name, body).any(|n| has_column(r, n)))
+        others.any(|r| names(name, body).any(|n| has_column(&r.poses, n)))
     };
     let bodies: Vec<(&String, &Body)> = profile.bodies.iter().filter(elsewhere).collect();
     if !bodies.is_empty() && !touched && !bodies.iter().any(|(name, body)| shown(name, body)) {
@@ -62,8 +35,8 @@ pub(super) fn missing_bodies(inputs: &Inputs, loaded: &Loaded) -> Vec<Finding> {
         let mut origins = profile.origins.values();
         origins.any(|origin| origin.sweep == loaded.name && origin.body == *name)
     };
-    let missing = bodies.iter().filter(|(name, body)| !shown(name, body));
-    missing
+    let unseen = bodies.iter().filter(|(name, body)| !shown(name, body));
+    unseen
         .filter_map(|&(name, body)| {
             let kind = match () {
                 () if is_swept(name) => "swept",
@@ -73,6 +46,59 @@ pub(super) fn missing_bodies(inputs: &Inputs, loaded: &Loaded) -> Vec<Finding> {
             Some(finding(kind, Subject::body(name), &[(name, body)]))
         })
         .collect()
+}
+
+/// What to say of a stream that shows no body of the profile, before anything is asked of its motion; `None` where it shows one, or nothing at all.
+pub(super) fn shows_none(profile: &Profile, name: &str, stream: &Poses) -> Option<Finding> {
+    if is_touched(profile, name) {
+        return None;
+    }
+    let bodies: Vec<(&String, &Body)> = profile.bodies.iter().collect();
+    let mut all = bodies.iter().flat_map(|(name, body)| names(name, body));
+    let is_blind = columns(stream).next().is_none() || bodies.is_empty();
+    if is_blind || all.any(|name| has_column(stream, name)) {
+        return None;
+    }
+    let free = free(profile, stream);
+    Some(missing(("all", Subject::default()), &bodies, stream, &free))
+}
+
+/// Whether the recording is one of contacts, which need no tracker.
+fn is_touched(profile: &Profile, recording: &str) -> bool {
+    let mut contacts = profile.contacts.values();
+    contacts.any(|contact| contact.recordings.iter().any(|name| name == recording))
+}
+
+fn columns(poses: &Poses) -> impl Iterator<Item = &String> {
+    poses.markers.keys().chain(poses.bodies.keys())
+}
+
+/// Columns of no body of the profile: a column of another body is not what was meant.
+fn free<'a>(profile: &Profile, poses: &'a Poses) -> Vec<&'a str> {
+    let bodies = &profile.bodies;
+    let all = || bodies.iter().flat_map(|(name, body)| names(name, body));
+    let is_free = |column: &&String| !all().any(|name| name == *column);
+    let free = columns(poses).filter(is_free);
+    free.map(String::as_str).collect()
+}
+
+fn missing(
+    (kind, subject): (&'static str, Subject),
+    bodies: &[(&String, &Body)],
+    poses: &Poses,
+    free: &[&str],
+) -> Finding {
+    let near = |(name, body): &(&String, &Body)| {
+        let first = names(name, body).next()?;
+        let longer = || free.iter().copied().find(|c| c.ends_with(first.as_str()));
+        nearest_word(first, free.iter().copied()).or_else(longer)
+    };
+    let near: Vec<&str> = bodies.iter().filter_map(near).collect();
+    let bodies = bodies.iter().map(|(name, _)| name.as_str());
+    Finding::of_kind(catalog::MISSING_BODY, kind, subject)
+        .with("bodies", Fact::names(bodies))
+        .with("known", Fact::names(columns(poses).map(String::as_str)))
+        .with_some("nearest", (!near.is_empty()).then(|| Fact::names(near)))
 }
 
 /// Whether all these names are there with one and the same text before or behind them, as trackers put that of a subject or a session.
@@ -92,8 +118,8 @@ fn renamed<'a>(names: impl Iterator<Item = &'a String>, free: &[&str]) -> bool {
     })
 }
 
-fn has_column(of: &Loaded, name: &String) -> bool {
-    of.poses.markers.contains_key(name) || of.poses.bodies.contains_key(name)
+fn has_column(of: &Poses, name: &String) -> bool {
+    of.markers.contains_key(name) || of.bodies.contains_key(name)
 }
 
 /// What columns of a body are named.

@@ -10,8 +10,8 @@
 //! Frame,Time (Seconds),X,Y,Z,W,X,Y,Z,,…
 //! ```
 //!
-//! `Rigid Body Marker` columns are computed from the body's pose: they are read as filled. `Marker` columns are
-//! measured. Times are seconds from the start; the start itself is local wall-clock text and is kept as a comment.
+//! `Rigid Body Marker` columns are computed from the body's pose: they are read as filled, and left out where the file
+//! also has the `Marker` columns of that body, which are measured and often have the same names. Times are seconds from the start; the start itself is local wall-clock text and is kept as a comment.
 //! The file does not say which axis is up (Y unless changed at export).
 
 use super::common::{
@@ -26,6 +26,7 @@ use crate::rotation::quaternion;
 use crate::text::{Lines, Separator, cells};
 use crate::units::LengthUnit;
 use calib_finding::{About, Finding};
+use std::collections::BTreeSet;
 use std::io::{BufRead, BufReader};
 use std::mem::take;
 use std::ops::Range;
@@ -247,6 +248,7 @@ fn plan(header: &Header, rotation_type: &str, recording: &mut Recording) -> Plac
             .conversions
             .push(format!("skipped columns: {}", skipped.join(", ")));
     }
+    tracks.leave_out_computed(&mut recording.meta.conversions);
     if tracks.markers.iter().any(|marker| marker.filled) {
         recording
             .meta
@@ -296,6 +298,26 @@ fn plan_marker(group: &Group, position: [usize; 3]) -> MarkerTrack {
 }
 
 impl Tracks {
+    /// Leaves out computed markers of bodies whose markers the file has as measured.
+    fn leave_out_computed(&mut self, conversions: &mut Vec<String>) {
+        let labeled = |marker: &&MarkerTrack| !marker.filled && !marker.stream.unlabeled;
+        let of_body = |marker: &MarkerTrack| marker.stream.body.clone();
+        let measured: BTreeSet<String> = (self.markers.iter().filter(labeled))
+            .filter_map(of_body)
+            .collect();
+        let is_twice = |marker: &MarkerTrack| {
+            let body = marker.stream.body.as_ref();
+            marker.filled && body.is_some_and(|body| measured.contains(body))
+        };
+        let before = self.markers.len();
+        self.markers.retain(|marker| !is_twice(marker));
+        if self.markers.len() < before {
+            conversions.push(
+                "rigid body markers are left out: the file has the measured markers".to_string(),
+            );
+        }
+    }
+
     fn make_names_unique(&mut self, findings: &mut Vec<Finding>) {
         let names = self.markers.iter().map(|m| m.stream.name.clone()).collect();
         let unique = unique_names(names, About::Marker, findings);

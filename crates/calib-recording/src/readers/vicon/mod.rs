@@ -408,9 +408,10 @@ impl Columns<'_> {
         for (name, columns) in &self.section.groups {
             let find = |axis: &str| columns.clone().find(|&i| self.section.header[i] == axis);
             if let (Some(x), Some(y), Some(z)) = (find("X"), find("Y"), find("Z")) {
-                tracks
-                    .markers
-                    .push(MarkerTrack::new(name, [x, y, z], false));
+                let mut marker = MarkerTrack::new(name, [x, y, z], false);
+                let subject = name.split_once(':').map(|(subject, _)| subject.to_string());
+                marker.stream.body = subject;
+                tracks.markers.push(marker);
             } else if let (Some(x), Some(y), Some(z)) = (find("TX"), find("TY"), find("TZ")) {
                 let (Some(a), Some(b), Some(c)) = (find("RX"), find("RY"), find("RZ")) else {
                     conversions.push(format!("`{name}` skipped: it has no rotation"));
