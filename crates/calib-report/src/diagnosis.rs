@@ -243,7 +243,7 @@ fn changed(report: &Report) -> Option<Diagnosis> {
 }
 
 /// Findings that say what made the errors.
-pub(crate) const NAMED_CAUSES: [Id; 9] = [
+pub(crate) const NAMED_CAUSES: [Id; 10] = [
     catalog::TRACKER_SCALE,
     catalog::CHANGED_WHILE_RECORDING,
     catalog::MISSING_PHYSICS,
@@ -253,10 +253,12 @@ pub(crate) const NAMED_CAUSES: [Id; 9] = [
     CAUSES[3],
     CAUSES[4],
     CAUSES[5],
+    CAUSES[6],
 ];
 
 /// Findings that name a cause of errors without a test of the fit, the most likely first.
-const CAUSES: [Id; 6] = [
+const CAUSES: [Id; 7] = [
+    catalog::BASE_MOVES,
     catalog::TRACKER_SWAYS,
     catalog::JOINTS_HELD,
     catalog::CLOCK_LAG,

@@ -82,6 +82,12 @@ super::topic! {
             "Body `{body}`, which no joint moves, moves by {motion} rms from row to row in the tracker's frame, and the other bodies move with it: the tracker, or what the robot stands on, does not stand still. This explains {explains:percent} of their squared residuals.",
             "Fasten the tracker and the robot's stand, and record again. Where the tracker must move, let its program report all coordinates in the frame of `{body}`; the noise of that frame then moves the other bodies, more the farther away they are.";
     }
+    /// A body that no joint moves follows the arm.
+    BASE_MOVES = "base-moves" {
+        "": Warning,
+            "Body `{body}`, which no joint moves, moves with the arm: by {motion} rms and up to {largest} in the tracker's frame. This is {share:percent} of its squared deviations. The base, or what it stands on, yields under the arm. The fit takes part of this motion for geometry or for effects of the joints, and these parameters are then off by more than their uncertainties.",
+            "Fasten the base, stiffen what it stands on, and record again. If this is how the robot works, fasten the tracker to the same base, or let its program report all coordinates in the frame of `{body}`, with markers that are far apart.";
+    }
     /// Nothing of the joints is free although they are not as the URDF says.
     JOINTS_HELD = "joints-held" {
         "": Warning,

@@ -56,6 +56,11 @@ impl Causes {
     /// Leaves neither changes nor missing effects: joints that are held explain them.
     pub(crate) fn explained_by_held_joints(&mut self) {
         (self.change, self.changed, self.scatter) = (None, None, None);
+        self.leave_effects();
+    }
+
+    /// Leaves no missing effects.
+    pub(crate) fn leave_effects(&mut self) {
         if let Some(goodness) = &mut self.goodness {
             goodness.missing.clear();
         }

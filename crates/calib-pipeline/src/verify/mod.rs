@@ -3,6 +3,7 @@
 pub mod accuracy;
 pub(crate) mod agreement;
 mod applied;
+mod base_moves;
 pub mod causes;
 pub mod changes;
 pub mod closure;
@@ -45,6 +46,7 @@ use crate::formulate::kinematics::Calibration;
 use crate::formulate::solved::Solved;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
+use crate::verify::base_moves::base_moves;
 use crate::verify::causes::{Causes, causes};
 use crate::verify::closure::close_loops;
 use crate::verify::known::{Known, Number, known_numbers};
@@ -108,6 +110,11 @@ pub fn verified(
     if let Some((sways, share)) = sways(inputs, &verified.residuals) {
         verified.causes.leave_change_that_explains_less(share);
         verified.findings.push(sways);
+    }
+    if let Some(moves) = base_moves(inputs, &verified.residuals) {
+        // Where the robot leans with its arm, effects of the arm are sought in vain.
+        verified.causes.leave_effects();
+        verified.findings.push(moves);
     }
     verified.findings.extend(fit.and_then(not_tested));
     let missing = verified.causes.goodness.as_ref();

@@ -55,7 +55,7 @@ pub(super) fn sways(inputs: &Inputs, residuals: &[ResidualRow]) -> Option<(Findi
 }
 
 /// Whether no joint moves the body.
-fn stands(inputs: &Inputs, body: &Body) -> bool {
+pub(super) fn stands(inputs: &Inputs, body: &Body) -> bool {
     let model = &inputs.robot.model;
     let up = model.chain_to_root(body.link);
     up.iter()
@@ -63,7 +63,7 @@ fn stands(inputs: &Inputs, body: &Body) -> bool {
 }
 
 /// What the residuals of a body are called.
-fn subjects<'a>(name: &'a str, body: &'a Body) -> BTreeSet<&'a str> {
+pub(super) fn subjects<'a>(name: &'a str, body: &'a Body) -> BTreeSet<&'a str> {
     match &body.kind {
         BodyKind::Markers { names, .. } => names.iter().map(String::as_str).collect(),
         BodyKind::Pose => BTreeSet::from([name]),
