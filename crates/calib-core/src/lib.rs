@@ -142,6 +142,7 @@ pub use nalgebra;
 pub use analysis::admit::Admission;
 pub use analysis::along_sight::{AlongSight, Likelier};
 pub use analysis::bounds::Unbounded;
+pub use analysis::by_place::ByPlace;
 pub use analysis::change::contest::{Contest, Suspect};
 pub use analysis::change::{
     BesideScatter, ChanceOfChanges, Change, ChangeScan, ChangeSettings, Left, Moved, Scatter,

@@ -243,7 +243,7 @@ fn changed(report: &Report) -> Option<Diagnosis> {
 }
 
 /// Findings that say what made the errors.
-pub(crate) const NAMED_CAUSES: [Id; 10] = [
+pub(crate) const NAMED_CAUSES: [Id; 11] = [
     catalog::TRACKER_SCALE,
     catalog::CHANGED_WHILE_RECORDING,
     catalog::MISSING_PHYSICS,
@@ -254,12 +254,14 @@ pub(crate) const NAMED_CAUSES: [Id; 10] = [
     CAUSES[4],
     CAUSES[5],
     CAUSES[6],
+    CAUSES[7],
 ];
 
 /// Findings that name a cause of errors without a test of the fit, the most likely first.
-const CAUSES: [Id; 7] = [
+const CAUSES: [Id; 8] = [
     catalog::BASE_MOVES,
     catalog::TRACKER_SWAYS,
+    catalog::ERRORS_FOLLOW_PLACE,
     catalog::JOINTS_HELD,
     catalog::CLOCK_LAG,
     catalog::JOINT_GAIN,

@@ -23,6 +23,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
+use crate::analysis::by_place::Bend;
 use crate::analysis::looked_at::LookedAt;
 use crate::analysis::score::Scored;
 use crate::analysis::solution::Solution;
@@ -132,6 +133,8 @@ enum Effect {
     Joints(Vec<(usize, Drives, Vec<f64>)>),
     /// A drift of the measuring frame along one of its axes.
     Drift(usize, Vec<f64>),
+    /// A smooth displacement of what stands at a place.
+    Place(Bend),
 }
 
 #[derive(Clone)]
@@ -158,6 +161,17 @@ impl Candidate {
             joint: None,
             physics: Physics::Effect(kind),
             effect: Effect::Joints(joints.into_iter().map(part).collect()),
+            tries: 1.0,
+        }
+    }
+
+    /// A smooth displacement by the place in the measuring frame.
+    pub(crate) fn of_place(bend: Bend) -> Self {
+        Self {
+            name: String::new(),
+            joint: None,
+            physics: Physics::Drift,
+            effect: Effect::Place(bend),
             tries: 1.0,
         }
     }
@@ -355,7 +369,7 @@ impl Solution {
     }
 
     /// C of some samples with the prior, and δ = −C g to their own minimum, from their H and g without it.
-    fn to_own_minimum(
+    pub(crate) fn to_own_minimum(
         &self,
         h: &DMatrix<f64>,
         g: &DVector<f64>,

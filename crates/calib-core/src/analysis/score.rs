@@ -14,7 +14,7 @@ use nalgebra::{DMatrix, DVector};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
 /// A direction with less than this share of its own information is one that the parameters imitate: it cannot be tested.
-const IMITATED: f64 = 1e-6;
+pub(crate) const IMITATED: f64 = 1e-6;
 
 /// What a test is made of.
 pub(crate) struct Scored<'a> {

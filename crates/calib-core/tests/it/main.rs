@@ -1,6 +1,7 @@
 //! The solver and what is made of its result.
 
 mod baseline;
+mod by_place;
 mod change;
 mod common;
 mod dependence;

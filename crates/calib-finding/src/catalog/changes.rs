@@ -88,6 +88,12 @@ super::topic! {
             "Body `{body}`, which no joint moves, moves with the arm: by {motion} rms and up to {largest} in the tracker's frame. This is {share:percent} of its squared deviations. The base, or what it stands on, yields under the arm. The fit takes part of this motion for geometry or for effects of the joints, and these parameters are then off by more than their uncertainties.",
             "Fasten the base, stiffen what it stands on, and record again. If this is how the robot works, fasten the tracker to the same base, or let its program report all coordinates in the frame of `{body}`, with markers that are far apart.";
     }
+    /// The errors are a smooth function of the place in the tracker's volume.
+    ERRORS_FOLLOW_PLACE = "errors-follow-place" {
+        "": Warning,
+            "The residuals follow the place in the tracker's frame: a smooth displacement of about {rms} rms explains {explains:percent} of χ², more than effects of the joints do. Either the tracker distorts its volume, or what the robot stands on yields with the posture. The fit takes part of such a displacement for geometry, and these parameters are then off by more than their uncertainties.",
+            "Measure a bar of known length at several places of the volume, and calibrate the tracker again where the lengths differ. Or move the tracker and record once more: errors of the tracker stay with its volume, those of the robot with the posture.";
+    }
     /// Nothing of the joints is free although they are not as the URDF says.
     JOINTS_HELD = "joints-held" {
         "": Warning,

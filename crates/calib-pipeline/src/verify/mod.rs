@@ -4,6 +4,7 @@ pub mod accuracy;
 pub(crate) mod agreement;
 mod applied;
 mod base_moves;
+mod by_place;
 pub mod causes;
 pub mod changes;
 pub mod closure;
@@ -47,6 +48,7 @@ use crate::formulate::solved::Solved;
 use crate::prepare::inputs::Inputs;
 use crate::prepare::tracks::BodyTrack;
 use crate::verify::base_moves::base_moves;
+use crate::verify::by_place::by_place;
 use crate::verify::causes::{Causes, causes};
 use crate::verify::closure::close_loops;
 use crate::verify::known::{Known, Number, known_numbers};
@@ -115,6 +117,11 @@ pub fn verified(
         // Where the robot leans with its arm, effects of the arm are sought in vain.
         verified.causes.leave_effects();
         verified.findings.push(moves);
+    } else if verified.findings.is_empty()
+        && let Some(found) = fit.and_then(|fit| by_place(inputs, fit, &verified.causes))
+    {
+        verified.causes.leave_effects();
+        verified.findings.push(found);
     }
     verified.findings.extend(fit.and_then(not_tested));
     let missing = verified.causes.goodness.as_ref();

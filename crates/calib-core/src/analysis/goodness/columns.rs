@@ -26,6 +26,12 @@ pub(crate) struct Seen {
     pub columns: DMatrix<f64>,
 }
 
+/// The twist of what stands at `pose` where everything is displaced by `d` in the measuring frame.
+fn moved(pose: &Pose, d: &Vector3<f64>) -> Vector6<f64> {
+    let v = pose.r.tr_mul(d);
+    Vector6::new(0.0, 0.0, 0.0, v.x, v.y, v.z)
+}
+
 impl Solution {
     /// Calls `see` with the whitened rows of each of `samples` and the candidates' whitened columns L⁻¹a, side by side.
     pub(crate) fn each_sample(
@@ -105,8 +111,14 @@ impl Solution {
                     Effect::Drift(axis, values) => {
                         let mut e = Vector3::zeros();
                         e[*axis] = values[sample];
-                        let v = pose.r.tr_mul(&e);
-                        Vector6::new(0.0, 0.0, 0.0, v.x, v.y, v.z)
+                        moved(&pose, &e)
+                    }
+                    Effect::Place(bend) => {
+                        let point = jacobian.point.map_or_else(Vector3::zeros, |(p, _)| {
+                            model.point_position(p.index(), &self.values).coords
+                        });
+                        let from = model.problem.measurements[measurement].from;
+                        moved(&pose, &bend.at(from, &(pose.t + pose.r * point)))
                     }
                 };
                 for i in 0..count {

@@ -185,7 +185,7 @@ impl Candidate {
         let mut out = self.clone();
         match &mut out.effect {
             Effect::Joints(parts) => parts.first_mut()?.2 = values,
-            Effect::Drift(..) => return None,
+            Effect::Drift(..) | Effect::Place(_) => return None,
         }
         Some(out)
     }

@@ -1,0 +1,297 @@
+//! Do the errors follow the place in the measuring frame? A tracker that distorts its volume displaces what it sees by a smooth function of the place.
+//!
+//! ```text
+//! d(p) = Σ_ak c_ak φ_k(p) e_a,   a = x, y, z,   k = 1 … 6                                       (1)
+//! ```
+//!
+//! φ_k are the quadratic monomials of the place, less what 1, x, y and z explain of them over the places seen (registration and scale are that), each
+//! with an rms of 1. The eighteen columns are tested together ([`score`](super::score)). What joints lack displaces a body by smooth functions of the
+//! place, too: both are compared by what they take of χ² beyond chance, which is one for each of the columns, and 2 ln M for the best of M effects; the
+//! effects are taken one after the other.
+
+use std::sync::Arc;
+
+use nalgebra::{DMatrix, DVector, Matrix4, Vector3, Vector4};
+use serde::{Deserialize, Serialize};
+
+use crate::analysis::goodness::Candidate;
+use crate::analysis::looked_at::LookedAt;
+use crate::analysis::score::{IMITATED, Scored};
+use crate::analysis::solution::Solution;
+use crate::analysis::successive::clustered;
+use crate::graph::ids::FrameId;
+use crate::graph::measurement::MeasurementKind;
+use crate::model::cache::State;
+use crate::model::path::Derivatives;
+use crate::solve::equations::Workspace;
+use crate::solve::whitened::covariance_of;
+
+/// Quadratic monomials of three coordinates.
+const TERMS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
+/// Columns of equation (1).
+const COLUMNS: usize = 3 * TERMS.len();
+/// Samples that tell so many columns from what each of them has of its own.
+const SAMPLES: usize = 2 * COLUMNS;
+/// What a coefficient may be before the data are seen, m: 1 mm where the curvature is largest.
+const WIDE: f64 = 1e-3;
+/// Effects of joints that are taken one after the other, at most.
+const EFFECTS: usize = 10;
+
+/// Smooth functions of the place: equation (1).
+#[derive(Debug, Clone)]
+pub(crate) struct Bends {
+    frame: FrameId,
+    middle: Vector3<f64>,
+    /// 1, x, y, z of each function's part that is taken away.
+    linear: [Vector4<f64>; 6],
+    /// What each is multiplied by, 1/m²; 0 where the places do not show it.
+    scale: [f64; 6],
+}
+
+/// One column of equation (1).
+#[derive(Debug, Clone)]
+pub(crate) struct Bend {
+    of: Arc<Bends>,
+    axis: usize,
+    term: usize,
+}
+
+impl Bend {
+    /// Displacement of what is measured from `frame` at a place, m per m.
+    pub(crate) fn at(&self, frame: FrameId, place: &Vector3<f64>) -> Vector3<f64> {
+        match frame == self.of.frame {
+            true => Vector3::ith(self.axis, self.of.value(self.term, place)),
+            false => Vector3::zeros(),
+        }
+    }
+}
+
+impl Bends {
+    /// `None` where there are too few places.
+    fn of(frame: FrameId, places: &[Vector3<f64>]) -> Option<Self> {
+        let count = places.len() as f64;
+        let middle = places.iter().sum::<Vector3<f64>>() / count;
+        let mut moments = Matrix4::zeros();
+        let mut products = [Vector4::zeros(); 6];
+        for place in places {
+            let p = place - middle;
+            let linear = Vector4::new(1.0, p.x, p.y, p.z);
+            moments += linear * linear.transpose();
+            for (product, (i, j)) in products.iter_mut().zip(TERMS) {
+                *product += linear * (p[i] * p[j]);
+            }
+        }
+        let inverse = moments.pseudo_inverse(1e-9 * moments.trace()).ok()?;
+        let mut out = Self {
+            frame,
+            middle,
+            linear: products.map(|product| inverse * product),
+            scale: [1.0; 6],
+        };
+        let rms = |term: usize| {
+            let squares = places.iter().map(|place| out.value(term, place).powi(2));
+            (squares.sum::<f64>() / count).sqrt()
+        };
+        let rms: [f64; 6] = std::array::from_fn(rms);
+        let most = rms.iter().copied().fold(0.0, f64::max);
+        out.scale = rms.map(|rms| if rms > 1e-3 * most { 1.0 / rms } else { 0.0 });
+        (most > 0.0).then_some(out)
+    }
+
+    fn value(&self, term: usize, place: &Vector3<f64>) -> f64 {
+        let p = place - self.middle;
+        let (i, j) = TERMS[term];
+        let taken = self.linear[term].dot(&Vector4::new(1.0, p.x, p.y, p.z));
+        self.scale[term] * (p[i] * p[j] - taken)
+    }
+
+    /// The columns, axis by axis.
+    fn columns(self) -> Vec<Candidate> {
+        let of = Arc::new(self);
+        let column = |c: usize| Bend {
+            of: Arc::clone(&of),
+            axis: c / TERMS.len(),
+            term: c % TERMS.len(),
+        };
+        (0..COLUMNS)
+            .map(|c| Candidate::of_place(column(c)))
+            .collect()
+    }
+}
+
+/// That the errors follow the place in the measuring frame.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[non_exhaustive]
+pub struct ByPlace {
+    /// Probability of so much by chance.
+    pub p_value: f64,
+    /// Share of χ² that the columns of equation (1) take.
+    pub explains: f64,
+    /// The displacement, rms over what was seen, m, with what the parameters took up of it.
+    pub rms: f64,
+    /// Whether effects of the joints explain less beyond chance.
+    pub more_than_effects: bool,
+}
+
+/// Sums over the samples for the score of columns.
+struct Sums {
+    u: DVector<f64>,
+    information: DMatrix<f64>,
+    raw: Vec<f64>,
+    chi2: f64,
+    samples: usize,
+    /// Each sample's own share of U, where asked.
+    shares: Vec<DVector<f64>>,
+}
+
+impl Solution {
+    /// Whether errors follow the place in `frame`, by equation (1). `None` where chance of 1 in `1/most` explains it, where the model cannot be evaluated,
+    /// or where there are fewer than 36 samples.
+    #[must_use]
+    pub fn by_place(&self, frame: FrameId, most: f64) -> Option<ByPlace> {
+        let looked_at = self.looked_at();
+        if !self.is_testable() || looked_at.samples.len() < SAMPLES {
+            return None;
+        }
+        let bends = Bends::of(frame, &self.places(frame, &looked_at))?.columns();
+        let sums = self.sums(&bends, &looked_at, true)?;
+        let wide = DMatrix::from_diagonal_element(COLUMNS, COLUMNS, WIDE.powi(-2));
+        let estimate = (&sums.information + wide).cholesky()?.solve(&sums.u);
+        let clusters = clustered(&sums.shares, COLUMNS);
+        let excess = (self.chi2 / self.degrees_of_freedom.max(1.0)).max(1.0);
+        let scored = Scored {
+            u: &sums.u,
+            information: &sums.information,
+            raw: &sums.raw,
+            clusters: Some(&clusters),
+            excess,
+            samples: sums.samples,
+        };
+        let tested = scored.test().filter(|tested| tested.p_value < most)?;
+        let place = sums.u.dot(&estimate);
+        let mut effects = self.candidates();
+        let count = effects.len();
+        effects.extend(bends);
+        let all = self.sums(&effects, &looked_at, false)?;
+        let price = 2.0 * (count.max(2) as f64).ln();
+        let of_effects = one_by_one(&all, count, price * excess);
+        Some(ByPlace {
+            p_value: tested.p_value,
+            explains: (place / sums.chi2.max(f64::MIN_POSITIVE)).min(1.0),
+            // Functions of rms 1 that are not independent of each other: their common rms is below this.
+            rms: estimate.norm(),
+            more_than_effects: place - excess * tested.rank as f64 > of_effects,
+        })
+    }
+
+    /// Where the observations of the samples lie in the frame that they are measured from, m.
+    fn places(&self, frame: FrameId, looked_at: &LookedAt) -> Vec<Vector3<f64>> {
+        let model = &self.model;
+        let mut work = Workspace::new(model);
+        work.cache.update(&model.problem, &self.values);
+        let at = State::new(&model.problem, &work.cache, &self.values);
+        let mut places = Vec::new();
+        for (m, measurement) in model.problem.measurements.iter().enumerate() {
+            let markers = match &measurement.kind {
+                MeasurementKind::Markers(markers) => Some(markers),
+                MeasurementKind::Poses(_) => None,
+                _ => continue,
+            };
+            if measurement.from != frame {
+                continue;
+            }
+            let mut buffer = model.paths[m].buffer();
+            for (sample, seen) in &model.of_measurement[m] {
+                if looked_at.samples.binary_search(sample).is_err() {
+                    continue;
+                }
+                let pose = model.paths[m].evaluate(at, *sample, Derivatives::None, &mut buffer);
+                for o in seen.clone().filter(|o| self.weights[*o] > 0.0) {
+                    let point = markers.map_or_else(Vector3::zeros, |markers| {
+                        let point = markers.observations[model.observations[o].item].point;
+                        model.point_position(point.index(), &self.values).coords
+                    });
+                    places.push(pose.t + pose.r * point);
+                }
+            }
+        }
+        places
+    }
+
+    fn sums(&self, columns: &[Candidate], looked_at: &LookedAt, shares: bool) -> Option<Sums> {
+        let (n, count) = (self.model.free(), columns.len());
+        let (mut u, mut gram) = (DVector::zeros(count), DMatrix::zeros(count, count));
+        let mut b = DMatrix::zeros(n, count);
+        let (mut h, mut g) = (DMatrix::zeros(n, n), DVector::zeros(n));
+        let mut kept = Vec::new();
+        for seen in self.seen(columns, &looked_at.samples) {
+            let rows = &seen.rows;
+            u.gemv_tr(1.0, &seen.columns, &rows.w, 1.0);
+            gram.gemm_tr(1.0, &seen.columns, &seen.columns, 1.0);
+            rows.a.add_transposed_times(1.0, &seen.columns, &mut b);
+            if !looked_at.all {
+                rows.a.add_gram(1.0, &mut h);
+                rows.a.add_transposed_vector(&rows.w, &mut g);
+            }
+            if shares {
+                kept.push(seen);
+            }
+        }
+        let (c, step) = match looked_at.all {
+            true => (covariance_of(&self.held_curvature())?, None),
+            false => {
+                let (c, step) = self.to_own_minimum(&h, &g)?;
+                u.gemv_tr(1.0, &b, &step, 1.0);
+                (c, Some(step))
+            }
+        };
+        let taken = &c * &b;
+        let raw = gram.diagonal().iter().copied().collect();
+        let information = &gram - b.tr_mul(&taken);
+        let wide = DMatrix::from_diagonal_element(count, count, WIDE.powi(-2));
+        let estimate = match shares {
+            true => (&information + wide).cholesky()?.solve(&u),
+            false => DVector::zeros(count),
+        };
+        let mut chi2 = 0.0;
+        let of = kept.iter().map(|seen| {
+            let left = &seen.columns - seen.rows.a.times(&taken);
+            let moved = step.as_ref().map(|step| seen.rows.a.times_vector(step));
+            let w = moved.map_or_else(|| seen.rows.w.clone(), |moved| &seen.rows.w + moved);
+            chi2 += w.norm_squared();
+            left.tr_mul(&(w - &left * &estimate))
+        });
+        let of_samples = of.collect();
+        Some(Sums {
+            u,
+            information,
+            raw,
+            chi2: if looked_at.all { self.chi2 } else { chi2 },
+            samples: looked_at.samples.len(),
+            shares: of_samples,
+        })
+    }
+}
+
+/// What the first `count` columns take of χ² less their price, taken one after the other as long as one is worth it.
+fn one_by_one(sums: &Sums, count: usize, price: f64) -> f64 {
+    let (mut u, mut left) = (sums.u.clone(), sums.information.clone());
+    let mut total = 0.0;
+    for _ in 0..EFFECTS {
+        let gain = |k: usize| match left[(k, k)] > IMITATED * sums.raw[k] {
+            true => u[k] * u[k] / left[(k, k)],
+            false => 0.0,
+        };
+        let best = (0..count).map(|k| (k, gain(k)));
+        let best = best.max_by(|a, b| a.1.total_cmp(&b.1));
+        let Some((k, gain)) = best.filter(|best| best.1 > price) else {
+            break;
+        };
+        total += gain - price;
+        let (own, of_k) = (left.column(k).into_owned(), left[(k, k)]);
+        let along = u[k] / of_k;
+        u.axpy(-along, &own, 1.0);
+        left.ger(-1.0 / of_k, &own, &own, 1.0);
+    }
+    total
+}
