@@ -11,9 +11,10 @@
 
 use std::sync::Arc;
 
-use nalgebra::{DMatrix, DVector, Matrix4, Vector3, Vector4};
+use nalgebra::{DMatrix, DVector, Vector3};
 use serde::{Deserialize, Serialize};
 
+use crate::analysis::bends::{Bends, TERMS};
 use crate::analysis::goodness::Candidate;
 use crate::analysis::looked_at::LookedAt;
 use crate::analysis::score::{IMITATED, Scored};
@@ -26,8 +27,6 @@ use crate::model::path::Derivatives;
 use crate::solve::equations::Workspace;
 use crate::solve::whitened::covariance_of;
 
-/// Quadratic monomials of three coordinates.
-const TERMS: [(usize, usize); 6] = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)];
 /// Columns of equation (1).
 const COLUMNS: usize = 3 * TERMS.len();
 /// Samples that tell so many columns from what each of them has of its own.
@@ -36,88 +35,6 @@ const SAMPLES: usize = 2 * COLUMNS;
 const WIDE: f64 = 1e-3;
 /// Effects of joints that are taken one after the other, at most.
 const EFFECTS: usize = 10;
-
-/// Smooth functions of the place: equation (1).
-#[derive(Debug, Clone)]
-pub(crate) struct Bends {
-    frame: FrameId,
-    middle: Vector3<f64>,
-    /// 1, x, y, z of each function's part that is taken away.
-    linear: [Vector4<f64>; 6],
-    /// What each is multiplied by, 1/m²; 0 where the places do not show it.
-    scale: [f64; 6],
-}
-
-/// One column of equation (1).
-#[derive(Debug, Clone)]
-pub(crate) struct Bend {
-    of: Arc<Bends>,
-    axis: usize,
-    term: usize,
-}
-
-impl Bend {
-    /// Displacement of what is measured from `frame` at a place, m per m.
-    pub(crate) fn at(&self, frame: FrameId, place: &Vector3<f64>) -> Vector3<f64> {
-        match frame == self.of.frame {
-            true => Vector3::ith(self.axis, self.of.value(self.term, place)),
-            false => Vector3::zeros(),
-        }
-    }
-}
-
-impl Bends {
-    /// `None` where there are too few places.
-    fn of(frame: FrameId, places: &[Vector3<f64>]) -> Option<Self> {
-        let count = places.len() as f64;
-        let middle = places.iter().sum::<Vector3<f64>>() / count;
-        let mut moments = Matrix4::zeros();
-        let mut products = [Vector4::zeros(); 6];
-        for place in places {
-            let p = place - middle;
-            let linear = Vector4::new(1.0, p.x, p.y, p.z);
-            moments += linear * linear.transpose();
-            for (product, (i, j)) in products.iter_mut().zip(TERMS) {
-                *product += linear * (p[i] * p[j]);
-            }
-        }
-        let inverse = moments.pseudo_inverse(1e-9 * moments.trace()).ok()?;
-        let mut out = Self {
-            frame,
-            middle,
-            linear: products.map(|product| inverse * product),
-            scale: [1.0; 6],
-        };
-        let rms = |term: usize| {
-            let squares = places.iter().map(|place| out.value(term, place).powi(2));
-            (squares.sum::<f64>() / count).sqrt()
-        };
-        let rms: [f64; 6] = std::array::from_fn(rms);
-        let most = rms.iter().copied().fold(0.0, f64::max);
-        out.scale = rms.map(|rms| if rms > 1e-3 * most { 1.0 / rms } else { 0.0 });
-        (most > 0.0).then_some(out)
-    }
-
-    fn value(&self, term: usize, place: &Vector3<f64>) -> f64 {
-        let p = place - self.middle;
-        let (i, j) = TERMS[term];
-        let taken = self.linear[term].dot(&Vector4::new(1.0, p.x, p.y, p.z));
-        self.scale[term] * (p[i] * p[j] - taken)
-    }
-
-    /// The columns, axis by axis.
-    fn columns(self) -> Vec<Candidate> {
-        let of = Arc::new(self);
-        let column = |c: usize| Bend {
-            of: Arc::clone(&of),
-            axis: c / TERMS.len(),
-            term: c % TERMS.len(),
-        };
-        (0..COLUMNS)
-            .map(|c| Candidate::of_place(column(c)))
-            .collect()
-    }
-}
 
 /// That the errors follow the place in the measuring frame.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -153,7 +70,7 @@ impl Solution {
         if !self.is_testable() || looked_at.samples.len() < SAMPLES {
             return None;
         }
-        let bends = Bends::of(frame, &self.places(frame, &looked_at))?.columns();
+        let bends = columns(Bends::of(frame, &self.places(frame, &looked_at))?);
         let sums = self.sums(&bends, &looked_at, true)?;
         let wide = DMatrix::from_diagonal_element(COLUMNS, COLUMNS, WIDE.powi(-2));
         let estimate = (&sums.information + wide).cholesky()?.solve(&sums.u);
@@ -271,6 +188,13 @@ impl Solution {
             shares: of_samples,
         })
     }
+}
+
+/// The columns of equation (1), axis by axis.
+fn columns(of: Bends) -> Vec<Candidate> {
+    let of = Arc::new(of);
+    let bend = |c: usize| Bends::along(&of, c / TERMS.len(), c % TERMS.len());
+    (0..COLUMNS).map(|c| Candidate::of_place(bend(c))).collect()
 }
 
 /// What the first `count` columns take of χ² less their price, taken one after the other as long as one is worth it.

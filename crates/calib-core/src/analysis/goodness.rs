@@ -23,7 +23,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 
-use crate::analysis::by_place::Bend;
+use crate::analysis::bends::Bend;
 use crate::analysis::looked_at::LookedAt;
 use crate::analysis::score::Scored;
 use crate::analysis::solution::Solution;

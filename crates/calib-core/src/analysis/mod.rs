@@ -3,6 +3,7 @@
 pub(crate) mod admit;
 pub(crate) mod along_sight;
 pub(crate) mod beginning;
+pub(crate) mod bends;
 pub(crate) mod bounds;
 pub(crate) mod by_place;
 pub(crate) mod change;

@@ -91,8 +91,8 @@ super::topic! {
     /// The errors are a smooth function of the place in the tracker's volume.
     ERRORS_FOLLOW_PLACE = "errors-follow-place" {
         "": Warning,
-            "The residuals follow the place in the tracker's frame: a smooth displacement of about {rms} rms explains {explains:percent} of χ², more than effects of the joints do. Either the tracker distorts its volume, or what the robot stands on yields with the posture. The fit takes part of such a displacement for geometry, and these parameters are then off by more than their uncertainties.",
-            "Measure a bar of known length at several places of the volume, and calibrate the tracker again where the lengths differ. Or move the tracker and record once more: errors of the tracker stay with its volume, those of the robot with the posture.";
+            "The residuals follow the place in the tracker's frame: a smooth displacement of about {rms} rms explains {explains:percent} of χ², more than effects of the joints do. Either the tracker distorts its volume, bodies are seen by trackers that do not agree, or a guide, a bearing or what the robot stands on is bent or yields. The fit takes part of such a displacement for geometry, and these parameters are then off by more than their uncertainties.",
+            "Measure a bar of known length at several places of the volume, and calibrate the tracker again where the lengths differ. If they agree, look for what yields: errors of the tracker stay at their place in its volume when the tracker is moved, those of the robot move with it.";
     }
     /// Nothing of the joints is free although they are not as the URDF says.
     JOINTS_HELD = "joints-held" {
