@@ -122,3 +122,55 @@ fn predictions_with_a_joint_that_stood_still_say_so() {
         said.stderr
     );
 }
+
+/// The tracker was bumped in the middle of a recording. Lengths in inches and another axis leave less than that, of motions that are small beside them; a
+/// wrong unit would leave as much as the robot moves.
+#[test]
+fn a_bump_of_the_tracker_is_no_unit() {
+    for seed in ["1", "2", "3", "4", "5", "6"] {
+        let dir = Scratch::new().file("head.urdf", URDF);
+        let dir = dir.file("head.yaml", PROFILE);
+        dir.calib(["simulate", "head.yaml", "--seed", seed, "--out", "."])
+            .expect(0);
+        // A step of 10 mm.
+        let bumped = |dir: Scratch, file: &str, from: usize| {
+            dir.cells(file, |row, column, cell| {
+                let by = match column {
+                    "plate.x_m" => 6e-3,
+                    "plate.y_m" => -6e-3,
+                    "plate.z_m" => 5e-3,
+                    _ => return cell.to_owned(),
+                };
+                match cell.parse::<f64>() {
+                    Ok(at) if row >= from => (at + by).to_string(),
+                    _ => cell.to_owned(),
+                }
+            })
+        };
+        let dir = bumped(bumped(dir, "poses.csv", 13), "checks.csv", 0);
+        let said = dir.calib(["run", "head.yaml", "--out", "results"]);
+        let all = format!("{}{}", said.stdout, said.stderr);
+        assert!(!all.contains("unit"), "seed {seed}: {all}");
+        assert!(all.contains("moved by"), "seed {seed}: {all}");
+    }
+}
+
+/// A sweep of three rows from which no origin is found takes part like any other recording.
+#[test]
+fn a_short_recording_of_many_is_no_mistake() {
+    let profile = PROFILE
+        .replace(
+            "  checks: {file: checks.csv, use: validation}",
+            "  short: {file: short.csv, use: sweep, joints: {tilt_deg: [-35, 50]}}\n  checks: {file: checks.csv, use: validation}",
+        )
+        .replace(
+            "    checks:\n",
+            "    short:\n      random: {tilt_deg: [-35, 50]}\n      poses: 3\n    checks:\n",
+        );
+    let dir = Scratch::new()
+        .file("head.urdf", URDF)
+        .file("head.yaml", &profile);
+    dir.calib(["simulate", "head.yaml", "--out", "."]).expect(0);
+    let ran = dir.calib(["run", "head.yaml", "--out", "results"]);
+    assert!(ran.code < 2, "{}", ran.stderr);
+}

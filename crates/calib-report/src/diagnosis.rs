@@ -100,6 +100,11 @@ impl Diagnosis {
 }
 
 fn below_noise(report: &Report) -> Option<Diagnosis> {
+    // A marker that is loose is not the tracker.
+    let mut findings = report.findings.iter();
+    if findings.any(|f| f.id == catalog::MARKER_NOISE && f.severity >= Severity::Warning) {
+        return None;
+    }
     let held_out = report.verification.held_out.as_ref()?;
     let tracker_m = held_out.expected.as_ref()?.tracker_m? * stated_share(report);
     let missed = |outcome| matches!(outcome, Outcome::Exceeded | Outcome::Undecided);
@@ -243,7 +248,7 @@ fn changed(report: &Report) -> Option<Diagnosis> {
 }
 
 /// Findings that say what made the errors.
-pub(crate) const NAMED_CAUSES: [Id; 11] = [
+pub(crate) const NAMED_CAUSES: [Id; 12] = [
     catalog::TRACKER_SCALE,
     catalog::CHANGED_WHILE_RECORDING,
     catalog::MISSING_PHYSICS,
@@ -255,10 +260,12 @@ pub(crate) const NAMED_CAUSES: [Id; 11] = [
     CAUSES[5],
     CAUSES[6],
     CAUSES[7],
+    CAUSES[8],
 ];
 
 /// Findings that name a cause of errors without a test of the fit, the most likely first.
-const CAUSES: [Id; 8] = [
+const CAUSES: [Id; 9] = [
+    catalog::MARKER_NOISE,
     catalog::BASE_MOVES,
     catalog::TRACKER_SWAYS,
     catalog::ERRORS_FOLLOW_PLACE,

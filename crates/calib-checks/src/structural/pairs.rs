@@ -1,5 +1,7 @@
 //! Two mistakes at once: each of the leading hypotheses with every other.
 
+use nalgebra::Vector3;
+
 use super::apply::{apply, apply_all};
 use super::hypothesis::{Hypothesis, Scoped};
 use super::naming::{Asked, EQUIVALENT_WITHIN};
@@ -24,6 +26,7 @@ pub(super) fn name_pair(asked: &Asked<'_>) -> Option<Named> {
         screened,
         options,
     } = *asked;
+    let shows_unit = ranking.none.rms > OF_MOTION * motion(&Scan::new(data, screened));
     let mut pairs: Vec<Pair> = Vec::new();
     for leader in distinct(&ranking.scored, options.beam) {
         let first = apply(&leader.scoped, data);
@@ -38,7 +41,8 @@ pub(super) fn name_pair(asked: &Asked<'_>) -> Option<Named> {
             .into_iter()
             .take(20)
         {
-            if undoes(&leader.scoped, &second.scoped) {
+            let of_unit = [&leader.scoped, &second.scoped].map(is_of_unit);
+            if undoes(&leader.scoped, &second.scoped) || (!shows_unit && of_unit.contains(&true)) {
                 continue;
             }
             let score = Score {
@@ -88,6 +92,34 @@ pub(super) fn name_pair(asked: &Asked<'_>) -> Option<Named> {
         within_expected: None,
         allowing: None,
     })
+}
+
+/// Lengths in another unit differ by a factor of 2.5 at least, and leave more than this part of the motion when robot and tracker are laid over each other.
+const OF_MOTION: f64 = 0.3;
+
+fn is_of_unit(scoped: &Scoped) -> bool {
+    matches!(scoped.hypothesis, Hypothesis::TrackerUnit { .. })
+}
+
+/// How far the points move about their own middle, rms, m.
+fn motion(scan: &Scan<'_>) -> f64 {
+    let count = scan.channels.len().max(1);
+    let (mut squares, mut all) = (0.0, 0.0);
+    for channel in 0..count {
+        let rows = || {
+            let rows = scan.points.iter().zip(&scan.weights);
+            rows.skip(channel).step_by(count)
+        };
+        let weight: f64 = rows().map(|(_, w)| w).sum();
+        if weight > 0.0 {
+            let mean = rows().map(|(p, w)| p * *w).sum::<Vector3<f64>>() / weight;
+            squares += rows()
+                .map(|(p, w)| w * (p - mean).norm_squared())
+                .sum::<f64>();
+            all += weight;
+        }
+    }
+    (squares / f64::max(all, f64::MIN_POSITIVE)).sqrt()
 }
 
 /// A correction and the one that takes it back.

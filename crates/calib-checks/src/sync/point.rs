@@ -33,8 +33,9 @@ pub struct LinkTrack {
     step: f64,
 }
 
-/// A marker must move by this, m rms: ten times what nominal kinematics leave unexplained.
-const MIN_MOTION: f64 = 0.03;
+/// A marker must move by this, m rms: far above any noise. What nominal kinematics leave of the motion is limited by [`MAX_LEFT`], for small robots and
+/// large ones.
+const MIN_MOTION: f64 = 5e-3;
 /// Samples in common, at least: four for each number of a row of A.
 const MIN_SAMPLES: usize = 4 * SIZE;
 /// Samples that the search looks at, evenly over all; those of the refinement.

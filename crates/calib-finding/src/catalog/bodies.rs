@@ -5,10 +5,10 @@ super::topic! {
     BODY_REDEFINED = "body-redefined" {
         "from_row": Error,
             "The distance between `{first}` and `{second}` changes by {change} from row {row} on, and keeps its new value.",
-            "Cut the recording at that row: a marker was moved or relabeled, or the body was created again.";
+            "Keep only the rows of one side, or write those of the other side to a recording of its own, in which the body has another name and is a body of its own in the profile: a marker was moved or relabeled, or the body was created again.";
         "marker_from_row": Error,
             "Marker `{marker}` moved on the body at row {row} and stayed there: only its distances change, by up to {change}.",
-            "Cut the recording at that row, or leave the marker out of the body: it slipped or was relabeled.";
+            "Leave the marker out of the body, or keep only the rows of one side: it slipped or was relabeled.";
         "between": Error,
             "The distance between `{first}` and `{second}` differs by {change} from that in `{other}`.",
             "Leave one of the recordings out, or give the body another name in it, with a column map of that recording (`columns: {markers: …}`, or `bodies`) and as a body of its own: a marker was moved or relabeled between them, or the body was created again.";

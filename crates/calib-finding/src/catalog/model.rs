@@ -116,7 +116,7 @@ super::topic! {
     BODY_REMOUNTED = "body-remounted" {
         "recordings": Error,
             "The recordings fit the nominal robot to {none} rms, but to {best} if body `{body}` was remounted for {recordings:code}[[ and {other_correction:code}]][[; the next best explanation leaves {next}]].[[ If errors of the robot within the priors are allowed for, the noise is {allowed_none} without this correction and {allowed} with it.]][[ These recordings do not distinguish it from {equivalent:code}.]][[ Nearly as good: {alternatives:code}.]][[ The remaining residual exceeds {limit}, the most that nominal errors explain: look for a second mistake.]]",
-            "Give the body another name in these recordings and in the profile, or record them again.";
+            "Give the body another name in these recordings, and add it to the profile under this name as one more body. A held-out recording must show a body of the fitted ones: record it again, or fit it (`use: static`) and hold another one out.";
         "held_out": Error,
             "The errors in {recordings:code} are {none} per coordinate, but only {best} if body `{body}` moved on its link by {distance} ± {sigma}[[ and {angle}]] before.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
             "Record the validation again without remounting the body between it and the fitted recordings.";

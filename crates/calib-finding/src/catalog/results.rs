@@ -144,7 +144,10 @@ super::topic! {
     }
     /// A marker scatters unlike the others of its body.
     MARKER_NOISE = "marker-noise" {
-        "": Info,
+        "loose": Warning,
+            "Marker `{marker}` of body `{body}` scatters by {sigma} per coordinate, the other markers by {others}. The fit gives it a noise level of its own, but its errors count in those of held-out poses.",
+            "Fasten or replace the marker, or leave it out of the body: it is loose, damaged, or partly hidden from the cameras.";
+        "differs": Info,
             "Marker `{marker}` of body `{body}` scatters by {sigma} per coordinate, the other markers by {others}: left-out poses are predicted better with a noise level of its own.",
             "Check the marker if it scatters more than the others: it may be loose, damaged, or partly hidden from the cameras.";
     }

@@ -67,6 +67,8 @@ fn own_levels(fit: &mut MlFit, inputs: &Inputs, settings: &Settings) -> bool {
 pub(crate) fn of_markers(fit: &MlFit) -> Vec<Finding> {
     /// Levels that differ by less than this, as logarithms, are the same.
     const ALIKE: f64 = 0.1;
+    /// A marker that scatters by so many times the noise of the others is not only seen worse.
+    const LOOSE: f64 = 3.0;
     let mut findings = Vec::new();
     let sigma = |group: GroupId| fit.solution.noise[group.index()].sigma;
     for measurement in fit.formulation.problem.measurements() {
@@ -86,7 +88,12 @@ pub(crate) fn of_markers(fit: &MlFit) -> Vec<Finding> {
             if (own / others).ln().abs() < ALIKE {
                 continue;
             }
-            let finding = Finding::new(catalog::MARKER_NOISE, About::Fit)
+            let kind = if own > LOOSE * others {
+                "loose"
+            } else {
+                "differs"
+            };
+            let finding = Finding::of_kind(catalog::MARKER_NOISE, kind, About::Fit)
                 .with("marker", Fact::name(marker))
                 .with("body", Fact::name(body))
                 .with("sigma", Fact::meters(own))

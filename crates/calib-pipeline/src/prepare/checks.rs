@@ -112,7 +112,9 @@ fn without_held(inputs: &Inputs, loaded: &Loaded, tracked: &Poses) -> Option<Pos
 /// Rows that a recording needs. Static poses may be spread over as many recordings as one likes.
 fn fewest_poses(inputs: &Inputs, loaded: &Loaded) -> usize {
     let of_static = inputs.recordings.values();
-    let of_static = of_static.filter(|r| r.spec.usage == Usage::Static);
+    let mut origins = inputs.robot.profile.origins.values();
+    let is_swept = origins.any(|origin| origin.sweep == loaded.name);
+    let of_static = of_static.filter(|r| r.spec.usage != Usage::Validation);
     let poses: usize = of_static.map(|r| r.poses.len()).sum();
     let copies = inputs.excluded.iter();
     let copies = copies.filter(|out| out.cause == RejectedFor::Copied);
@@ -123,6 +125,8 @@ fn fewest_poses(inputs: &Inputs, loaded: &Loaded) -> usize {
         _ if !copies.is_empty() && copies.len() == loaded.poses.len() => 0,
         Usage::Validation => 1,
         Usage::Static if poses >= MIN_POSES => 1,
+        // What is no origin's sweep is fitted with all others.
+        Usage::Sweep if !is_swept && poses >= MIN_POSES => 1,
         Usage::Static | Usage::Sweep => MIN_POSES,
     }
 }
