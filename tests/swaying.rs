@@ -101,13 +101,12 @@ fn nothing_else_is_called_a_tracker_that_sways() {
     }
 }
 
+/// Displacement of a marker by its name, its place and the middle of the markers that joints move, m.
+type Displacement = dyn Fn(&str, &Vector3<f64>, &Vector3<f64>) -> Vector3<f64>;
 type Places = BTreeMap<String, Vector3<f64>>;
 
 /// A table with every marker displaced, m, by what `displacement` says of its name, its place and the middle of the markers that joints move.
-fn displaced(
-    text: &str,
-    displacement: &dyn Fn(&str, &Vector3<f64>, &Vector3<f64>) -> Vector3<f64>,
-) -> String {
+fn displaced(text: &str, displacement: &Displacement) -> String {
     const AXES: [&str; 3] = ["x_m", "y_m", "z_m"];
     let mut header: Vec<&str> = Vec::new();
     let mut out = String::new();
@@ -148,9 +147,7 @@ fn displaced(
 }
 
 /// The report of the shipped robot with all tables displaced.
-fn judged_displaced(
-    displacement: &dyn Fn(&str, &Vector3<f64>, &Vector3<f64>) -> Vector3<f64>,
-) -> Value {
+fn judged_displaced(displacement: &Displacement) -> Value {
     let mut dir = Scratch::new().brief("ripley");
     for file in FILES {
         let text = std::fs::read_to_string(root().join(file)).expect("shipped");
