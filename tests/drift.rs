@@ -310,3 +310,72 @@ fn dated(dir: Scratch, name: &str, date: &str) -> Scratch {
     report["identification"]["date"] = date.into();
     dir.file(&file, report.to_string())
 }
+
+/// A joint that carries two others: the angles of its zero to each are two numbers, and none is compared with the other one.
+#[test]
+fn branches_of_an_unchanged_robot_are_not_mixed_up() {
+    const URDF: &str = r#"<robot name="torso">
+  <link name="base"/><link name="column"/><link name="chest"/><link name="left"/><link name="right"/><link name="hand"/>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="column"/>
+    <origin xyz="0 0 0.3"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+  <joint name="bend" type="revolute"><parent link="column"/><child link="chest"/>
+    <origin xyz="0.05 0 0.2"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+  <joint name="side" type="revolute"><parent link="chest"/><child link="left"/>
+    <origin xyz="0 0.2 0.3"/><axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+  <joint name="roll" type="revolute"><parent link="chest"/><child link="right"/>
+    <origin xyz="0.1 -0.2 0.35"/><axis xyz="0 0 1"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+  <joint name="nod" type="revolute"><parent link="right"/><child link="hand"/>
+    <origin xyz="0.2 0 0.1"/><axis xyz="0 1 0"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>
+</robot>
+"#;
+    const PROFILE: &str = "calib: 1
+robot: {name: torso, urdf: torso.urdf}
+tracker: {frame: lab, body_sigma_mm: 0.2, body_sigma_deg: 0.05}
+bodies:
+  upper: {link: left, pose: true}
+  lower: {link: hand, pose: true}
+recordings:
+  poses: {file: poses.csv, use: static}
+solve:
+  free: [bodies, tracker, joint_offsets, joint_axes]
+  limits: {held_out_rms_mm: 2}
+simulate:
+  seed: 1
+  tracker_from_root: {xyz_mm: [900, 120, -300], rpy_deg: [0, 0, 40]}
+  mounts:
+    upper: {xyz_mm: [40, 10, 30]}
+    lower: {xyz_mm: [20, 10, 60]}
+  errors: {joint_offset_deg: 0.2, axis_mm: 0.3, axis_deg: 0.05}
+  noise: {body_mm: 0.2, body_deg: 0.05, joint_deg: 0.005}
+  recordings:
+    poses:
+      random: {turn_deg: [-100, 100], bend_deg: [-50, 50], side_deg: [-50, 50], roll_deg: [-50, 50], nod_deg: [-50, 50]}
+      poses: 40
+";
+    let dir = Scratch::new()
+        .file("torso.urdf", URDF)
+        .file("torso.yaml", PROFILE);
+    dir.calib(["simulate", "torso.yaml", "--out", "."])
+        .expect(0);
+    dir.calib(["run", "torso.yaml", "--out", "res"]);
+    let names: Vec<String> = (dir.json("res/report.json")["data_information"]["quantities"]
+        .as_array())
+    .expect("a list")
+    .iter()
+    .map(|change| change["name"].to_string())
+    .collect();
+    let mut once = names.clone();
+    once.sort();
+    once.dedup();
+    assert_eq!(once.len(), names.len(), "{names:?}");
+    assert!(
+        names.iter().any(|name| name.contains("zero.bend.")),
+        "{names:?}"
+    );
+    let same = dir.calib(["drift", "res", "res"]).expect(0);
+    assert!(
+        same.stdout.contains("NO SIGNIFICANT CHANGE"),
+        "{}",
+        same.stdout
+    );
+}

@@ -470,6 +470,12 @@ fn numbers(
             }
         })
         .collect();
+    // Where a name stands for several numbers, as in reports of earlier versions of robots that branch, none is known by it.
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    for number in &numbers {
+        *counts.entry(number.name.clone()).or_default() += 1;
+    }
+    numbers.retain(|number| counts[&number.name] == 1);
     for (i, p) in parameters.iter().enumerate() {
         if p.joint.is_none() {
             continue;

@@ -125,7 +125,9 @@ fn heading(drift: &Drift) -> &'static str {
 fn zeros_not_compared(drift: &Drift, columns: usize) -> String {
     let is_compared = |joint: &&str| {
         let own = [format!("zero.{joint}"), format!("{joint}.offset")];
-        drift.numbers.iter().any(|n| own.contains(&n.name))
+        let of_branch = format!("zero.{joint}.");
+        let mut names = drift.numbers.iter().map(|n| &n.name);
+        names.any(|n| own.contains(n) || n.starts_with(&of_branch))
     };
     let zeros = drift
         .known_in_neither

@@ -12,6 +12,8 @@
 //! These are Denavit and Hartenberg's four (1955). Where an origin lies on its axis and where a frame's x points are
 //! conventions that a calibration cannot know; none of these numbers contains them.
 
+use std::collections::BTreeMap;
+
 use calib_report::Unit;
 use calib_urdf::{JointId, RobotModel};
 use nalgebra::{Point3, Unit as UnitVector, Vector3};
@@ -103,6 +105,8 @@ pub fn invariants(model: &RobotModel) -> Vec<Invariant> {
         })
     };
     let mut found = Vec::new();
+    // The third joint of what is named after the middle one.
+    let mut thirds = BTreeMap::new();
     for id in model.joint_ids() {
         let Some(last) = line(id) else { continue };
         let above: Vec<Line> = moving_joints_above(model, id).filter_map(line).collect();
@@ -124,10 +128,27 @@ pub fn invariants(model: &RobotModel) -> Vec<Invariant> {
             .iter()
             .find(|other| !other.slides || of_slide(other));
         if let Some(first) = first.filter(|_| nearest_behind) {
+            let before = found.len();
             triple(first, middle, &last, &mut found);
+            thirds.extend((before..found.len()).map(|place| (place, last.name.clone())));
         }
     }
+    tell_branches_apart(&mut found, &thirds);
     found
+}
+
+/// Where a joint carries several others, the numbers that are named after it are named after the one that it carries as well.
+fn tell_branches_apart(found: &mut [Invariant], thirds: &BTreeMap<usize, String>) {
+    let mut counts: BTreeMap<String, usize> = BTreeMap::new();
+    for invariant in found.iter() {
+        *counts.entry(invariant.name.clone()).or_default() += 1;
+    }
+    for (place, third) in thirds {
+        let name = &mut found[*place].name;
+        if counts.get(name).is_some_and(|count| *count > 1) {
+            *name = format!("{name}.{third}");
+        }
+    }
 }
 
 /// The moving joints between a joint and the root, nearest first.
