@@ -265,7 +265,6 @@ pub(crate) const NAMED_CAUSES: [Id; 12] = [
 
 /// Findings that name a cause of errors without a test of the fit, the most likely first.
 const CAUSES: [Id; 9] = [
-    catalog::MARKER_NOISE,
     catalog::BASE_MOVES,
     catalog::TRACKER_SWAYS,
     catalog::ERRORS_FOLLOW_PLACE,
@@ -274,6 +273,7 @@ const CAUSES: [Id; 9] = [
     catalog::JOINT_GAIN,
     catalog::JOINT_COUPLING,
     catalog::JOINT_SCATTERS,
+    catalog::MARKER_NOISE,
 ];
 
 /// Kinds of an offset of the clocks that the fit took into account: it made no error.

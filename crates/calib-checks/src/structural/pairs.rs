@@ -11,6 +11,9 @@ use super::scan::{Scan, Score};
 use super::sized;
 use super::twin::twin;
 
+/// Lengths in another unit differ by a factor of 2.5 at least, and leave more than this part of the motion when robot and tracker are laid over each other.
+const OF_MOTION: f64 = 0.3;
+
 /// Two corrections, with the residual after both.
 struct Pair {
     correction: Correction,
@@ -93,9 +96,6 @@ pub(super) fn name_pair(asked: &Asked<'_>) -> Option<Named> {
         allowing: None,
     })
 }
-
-/// Lengths in another unit differ by a factor of 2.5 at least, and leave more than this part of the motion when robot and tracker are laid over each other.
-const OF_MOTION: f64 = 0.3;
 
 fn is_of_unit(scoped: &Scoped) -> bool {
     matches!(scoped.hypothesis, Hypothesis::TrackerUnit { .. })

@@ -14,7 +14,7 @@ use std::sync::Arc;
 use nalgebra::{DMatrix, DVector, Vector3};
 use serde::{Deserialize, Serialize};
 
-use crate::analysis::bends::{Bends, TERMS};
+use crate::analysis::bends::{Bend, Bends, TERMS};
 use crate::analysis::goodness::Candidate;
 use crate::analysis::looked_at::LookedAt;
 use crate::analysis::score::{IMITATED, Scored};
@@ -62,16 +62,18 @@ struct Sums {
 }
 
 impl Solution {
-    /// Whether errors follow the place in `frame`, by equation (1). `None` where chance of 1 in `1/most` explains it, where the model cannot be evaluated,
-    /// or where there are fewer than 36 samples.
+    /// Whether errors follow the place in `frame`, by equation (1). `None` where chance explains it with a probability of `most` or more, where the
+    /// model cannot be evaluated, or where there are fewer than 36 samples.
     #[must_use]
     pub fn by_place(&self, frame: FrameId, most: f64) -> Option<ByPlace> {
         let looked_at = self.looked_at();
         if !self.is_testable() || looked_at.samples.len() < SAMPLES {
             return None;
         }
-        let bends = columns(Bends::of(frame, &self.places(frame, &looked_at))?);
-        let sums = self.sums(&bends, &looked_at, true)?;
+        let places = self.places(frame, &looked_at);
+        let bends = bends(Bends::of(frame, &places)?);
+        let columns: Vec<Candidate> = bends.iter().cloned().map(Candidate::of_place).collect();
+        let sums = self.sums(&columns, &looked_at, true)?;
         let wide = DMatrix::from_diagonal_element(COLUMNS, COLUMNS, WIDE.powi(-2));
         let estimate = (&sums.information + wide).cholesky()?.solve(&sums.u);
         let clusters = clustered(&sums.shares, COLUMNS);
@@ -88,15 +90,14 @@ impl Solution {
         let place = sums.u.dot(&estimate);
         let mut effects = self.candidates();
         let count = effects.len();
-        effects.extend(bends);
+        effects.extend(columns);
         let all = self.sums(&effects, &looked_at, false)?;
         let price = 2.0 * (count.max(2) as f64).ln();
         let of_effects = one_by_one(&all, count, price * excess);
         Some(ByPlace {
             p_value: tested.p_value,
             explains: (place / sums.chi2.max(f64::MIN_POSITIVE)).min(1.0),
-            // Functions of rms 1 that are not independent of each other: their common rms is below this.
-            rms: estimate.norm(),
+            rms: rms(&bends, &estimate, frame, &places),
             more_than_effects: place - excess * tested.rank as f64 > of_effects,
         })
     }
@@ -191,10 +192,20 @@ impl Solution {
 }
 
 /// The columns of equation (1), axis by axis.
-fn columns(of: Bends) -> Vec<Candidate> {
+fn bends(of: Bends) -> Vec<Bend> {
     let of = Arc::new(of);
     let bend = |c: usize| Bends::along(&of, c / TERMS.len(), c % TERMS.len());
-    (0..COLUMNS).map(|c| Candidate::of_place(bend(c))).collect()
+    (0..COLUMNS).map(bend).collect()
+}
+
+/// Displacement of equation (1) with these coefficients, rms over the places, m.
+fn rms(bends: &[Bend], c: &DVector<f64>, frame: FrameId, places: &[Vector3<f64>]) -> f64 {
+    let squared = |place: &Vector3<f64>| {
+        let parts = bends.iter().zip(c.iter());
+        let displaced = parts.map(|(bend, c)| bend.at(frame, place) * *c);
+        displaced.sum::<Vector3<f64>>().norm_squared()
+    };
+    (places.iter().map(squared).sum::<f64>() / places.len().max(1) as f64).sqrt()
 }
 
 /// What the first `count` columns take of χ² less their price, taken one after the other as long as one is worth it.

@@ -85,14 +85,14 @@ super::topic! {
     /// A body that no joint moves follows the arm.
     BASE_MOVES = "base-moves" {
         "": Warning,
-            "Body `{body}`, which no joint moves, moves with the arm: by {motion} rms and up to {largest} in the tracker's frame. This is {share:percent} of its squared deviations. The base, or what it stands on, yields under the arm. The fit takes part of this motion for geometry or for effects of the joints, and these parameters are then off by more than their uncertainties.",
+            "Body `{body}`, which no joint moves, moves with the arm: by {motion} rms and by up to {largest} from its mean place in the tracker's frame. This is {share:percent} of its squared deviations. The base, or what it stands on, yields under the arm. The fit takes part of this motion for geometry or for effects of the joints, and these parameters are then off by more than their uncertainties.",
             "Fasten the base, stiffen what it stands on, and record again. If this is how the robot works, fasten the tracker to the same base, or let its program report all coordinates in the frame of `{body}`, with markers that are far apart.";
     }
     /// The errors are a smooth function of the place in the tracker's volume.
     ERRORS_FOLLOW_PLACE = "errors-follow-place" {
         "": Warning,
             "The residuals follow the place in the tracker's frame: a smooth displacement of about {rms} rms explains {explains:percent} of χ², more than effects of the joints do. Either the tracker distorts its volume, bodies are seen by trackers that do not agree, or a guide, a bearing or what the robot stands on is bent or yields. The fit takes part of such a displacement for geometry, and these parameters are then off by more than their uncertainties.",
-            "Measure a bar of known length at several places of the volume, and calibrate the tracker again where the lengths differ. If they agree, look for what yields: errors of the tracker stay at their place in its volume when the tracker is moved, those of the robot move with it.";
+            "Measure a bar of known length at several places of the volume, and calibrate the tracker again where the lengths differ. If they agree, look for what is bent or yields. To separate the two, move the tracker and record again: errors of the tracker stay at their places in its volume, errors of the robot stay with the postures.";
     }
     /// Nothing of the joints is free although they are not as the URDF says.
     JOINTS_HELD = "joints-held" {

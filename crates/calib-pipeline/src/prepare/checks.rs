@@ -109,13 +109,13 @@ fn without_held(inputs: &Inputs, loaded: &Loaded, tracked: &Poses) -> Option<Pos
     (!held.is_empty()).then(|| tracked.select(&rest))
 }
 
-/// Rows that a recording needs. Static poses may be spread over as many recordings as one likes.
+/// Rows that a recording needs. Poses that are fitted together may be spread over as many recordings as one likes.
 fn fewest_poses(inputs: &Inputs, loaded: &Loaded) -> usize {
-    let of_static = inputs.recordings.values();
+    let fitted = inputs.recordings.values();
     let mut origins = inputs.robot.profile.origins.values();
     let is_swept = origins.any(|origin| origin.sweep == loaded.name);
-    let of_static = of_static.filter(|r| r.spec.usage != Usage::Validation);
-    let poses: usize = of_static.map(|r| r.poses.len()).sum();
+    let fitted = fitted.filter(|r| r.spec.usage != Usage::Validation);
+    let poses: usize = fitted.map(|r| r.poses.len()).sum();
     let copies = inputs.excluded.iter();
     let copies = copies.filter(|out| out.cause == RejectedFor::Copied);
     let copies = copies.filter(|out| out.recording == loaded.name);

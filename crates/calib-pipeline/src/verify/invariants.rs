@@ -133,12 +133,12 @@ pub fn invariants(model: &RobotModel) -> Vec<Invariant> {
             thirds.extend((before..found.len()).map(|place| (place, last.name.clone())));
         }
     }
-    tell_branches_apart(&mut found, &thirds);
+    name_branches(&mut found, &thirds);
     found
 }
 
 /// Where a joint carries several others, the numbers that are named after it are named after the one that it carries as well.
-fn tell_branches_apart(found: &mut [Invariant], thirds: &BTreeMap<usize, String>) {
+fn name_branches(found: &mut [Invariant], thirds: &BTreeMap<usize, String>) {
     let mut counts: BTreeMap<String, usize> = BTreeMap::new();
     for invariant in found.iter() {
         *counts.entry(invariant.name.clone()).or_default() += 1;
