@@ -4,6 +4,8 @@
 use crate::scratch;
 use crate::truth;
 
+use calib_geometry::registration::rigid_registration;
+use nalgebra::Point3;
 use scratch::Scratch;
 use serde_json::Value;
 use truth::{CHI2_99_SIX, Truth, errors};
@@ -628,4 +630,75 @@ fn a_sweep_that_is_listed_twice_stays_with_its_origin() {
     let named = found.iter().find(|f| f["id"] == "rows-repeated");
     let named = named.unwrap_or_else(|| panic!("{found:#?}"));
     assert!(named.to_string().contains("count twice"), "{named:#}");
+}
+
+/// The tracker wrote the pose of a body beside the markers that it computed it from: `calib check` says that both are one measurement.
+#[test]
+fn a_pose_beside_its_own_markers_is_named() {
+    let table = ripley().read("robots/ripley/arm_poses.csv");
+    let mut header: Vec<String> = Vec::new();
+    let mut template: Vec<Point3<f64>> = Vec::new();
+    let mut lines = Vec::new();
+    for line in table.lines() {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if line.starts_with('#') {
+            lines.push(line.to_owned());
+            continue;
+        }
+        if header.is_empty() {
+            header = cells.clone();
+            cells.extend(
+                ["x_m", "y_m", "z_m", "qx", "qy", "qz", "qw"].map(|c| format!("plate.{c}")),
+            );
+            lines.push(cells.join(","));
+            continue;
+        }
+        let at = |column: String| {
+            let place = header.iter().position(|c| *c == column).expect("a column");
+            cells[place].parse::<f64>().ok()
+        };
+        let marker = |k: usize| {
+            let of = |axis: &str| at(format!("gripM_{k}.{axis}_m"));
+            Some(Point3::new(of("x")?, of("y")?, of("z")?))
+        };
+        let seen: Option<Vec<Point3<f64>>> = (1..=4).map(marker).collect();
+        let pose = seen.map(|seen| {
+            if template.is_empty() {
+                template.clone_from(&seen);
+            }
+            rigid_registration(&template, &seen, None)
+                .expect("no line")
+                .b_from_a
+        });
+        cells.extend(pose.map_or_else(
+            || vec![String::new(); 7],
+            |pose| {
+                let (t, q) = (pose.translation, pose.rotation);
+                [t.x, t.y, t.z, q.i, q.j, q.k, q.w]
+                    .map(|v| format!("{v:.9}"))
+                    .to_vec()
+            },
+        ));
+        lines.push(cells.join(","));
+    }
+    let dir = ripley()
+        .file("robots/ripley/arm_poses.csv", lines.join("\n") + "\n")
+        .edit(
+            PROFILE,
+            "  linkM: {",
+            "  plate: {link: gripper, pose: true}\n  linkM: {",
+        )
+        .edit(
+            PROFILE,
+            "  mounts:\n",
+            "  mounts:\n    plate: {xyz_mm: [0, 0, 0]}\n",
+        );
+    eprintln!("DBG {}", dir.calib(["check", PROFILE]).stderr);
+    let found = findings(&dir, PROFILE);
+    let is_named = |f: &Value| {
+        f["id"] == "pose-of-markers"
+            && f["facts"]["body"] == "plate"
+            && f["facts"]["other"] == "gripM"
+    };
+    assert!(found.iter().any(is_named), "{found:#?}");
 }
