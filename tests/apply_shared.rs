@@ -431,3 +431,73 @@ fn what_several_joints_share_is_refused() {
     arguments.push("my_arm/config/arm.yaml");
     dir.calib_with(&arguments).expect(0);
 }
+
+/// The left arm's result and a file whose one macro call gives the right arm: what the file itself calls its joints decides, through parameters, their
+/// defaults, nested macros and properties.
+#[test]
+fn a_file_that_names_its_joints_for_another_arm_is_refused() {
+    let left = ARM
+        .replace("name=\"shoulder\"", "name=\"left_shoulder\"")
+        .replace("name=\"elbow\"", "name=\"left_elbow\"")
+        .replace("name=\"wrist\"", "name=\"left_wrist\"");
+    let joints = ["left_shoulder", "left_elbow", "left_wrist"];
+    let body = ARM
+        .replace("name=\"shoulder\"", "name=\"${side}shoulder\"")
+        .replace("name=\"elbow\"", "name=\"${side}elbow\"")
+        .replace("name=\"wrist\"", "name=\"${side}wrist\"");
+    let body = body
+        .trim_start_matches("<robot name=\"arm\">\n")
+        .trim_end_matches("</robot>\n");
+    let file = |head: &str, params: &str, call: &str| {
+        format!(
+            "<robot name=\"arm\" xmlns:xacro=\"http://www.ros.org/wiki/xacro\">\n{head}<xacro:macro name=\"arm\" \
+             params=\"{params}\">\n{body}</xacro:macro>\n{call}\n</robot>\n"
+        )
+    };
+    let property = |side: &str| format!("<xacro:property name=\"s\" value=\"{side}\"/>\n");
+    let nested = |side: &str| {
+        format!(
+            "<xacro:macro name=\"cell\" params=\"p\"><xacro:arm side=\"${{p}}\"/></xacro:macro>\n<xacro:cell p=\"{side}\"/>"
+        )
+    };
+    for (what, wrong, right) in [
+        (
+            "call",
+            file("", "side", "<xacro:arm side=\"right_\"/>"),
+            file("", "side", "<xacro:arm side=\"left_\"/>"),
+        ),
+        (
+            "default",
+            file("", "side:=right_", "<xacro:arm/>"),
+            file("", "side:=left_", "<xacro:arm/>"),
+        ),
+        (
+            "nested",
+            file("", "side", &nested("right_")),
+            file("", "side", &nested("left_")),
+        ),
+        (
+            "property",
+            file(&property("right_"), "side", "<xacro:arm side=\"${s}\"/>"),
+            file(&property("left_"), "side", "<xacro:arm side=\"${s}\"/>"),
+        ),
+        (
+            "no prefix",
+            file("", "side", "<xacro:arm side=\"\"/>"),
+            file("", "side", "<xacro:arm side=\"$(arg side)\"/>"),
+        ),
+    ] {
+        let dir = result(Scratch::new(), "result", &left, &joints);
+        let dir = dir.file("a.xacro", &wrong).file("b.xacro", &right);
+        let refused = dir.calib(["apply", RESULT, "a.xacro", "--in-place"]);
+        let said = refused.expect(7).stderr.replace('\n', " ");
+        assert!(
+            said.contains("has no joint `left_shoulder`"),
+            "{what}: {said}"
+        );
+        assert!(dir.read("a.xacro") == wrong, "{what}");
+        dir.calib(["apply", RESULT, "b.xacro", "--in-place"])
+            .expect(0);
+        assert!(dir.read("b.xacro") != right, "{what}");
+    }
+}

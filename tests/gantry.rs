@@ -261,6 +261,46 @@ fn a_gain_that_is_a_scale_as_well_is_said() {
     assert_eq!(said(&all), None);
 }
 
+/// All slides in centimeters under names that say millimeters: their unit is named, not the tracker's alone, and as it says all is right.
+#[test]
+fn slides_in_centimeters_are_not_a_tracker_in_another_unit() {
+    let mut dir = gantry(None, 6);
+    for file in ["gantry/poses.csv", "gantry/checks.csv"] {
+        let text = dir.read(file);
+        let (head, rows) = text.split_once('\n').expect("a header");
+        let head = ["gx", "gy", "gz"]
+            .iter()
+            .fold(head.to_owned(), |head, joint| {
+                head.replace(&format!("{joint}_m"), &format!("{joint}_mm"))
+            });
+        let in_centimeters = |row: &str| {
+            let cells = row.split(',').enumerate().map(|(k, cell)| match k {
+                0..3 => (100.0 * cell.parse::<f64>().expect("a number")).to_string(),
+                _ => cell.to_owned(),
+            });
+            cells.collect::<Vec<_>>().join(",")
+        };
+        let rows: Vec<String> = rows.lines().map(in_centimeters).collect();
+        dir = dir.file(file, format!("{head}\n{}\n", rows.join("\n")));
+    }
+    let said = dir.calib(["check", "gantry.yaml"]).expect(3).stdout;
+    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    for part in [
+        "all prismatic joints read as cm instead of mm",
+        "`gx_cm` instead of `gx_mm`",
+    ] {
+        assert!(said.contains(part), "{part}: {said}");
+    }
+    let mut dir = dir;
+    for file in ["gantry/poses.csv", "gantry/checks.csv"] {
+        for joint in ["gx", "gy", "gz"] {
+            dir = dir.edit(file, &format!("{joint}_mm"), &format!("{joint}_cm"));
+        }
+    }
+    let verdict = run(&dir)["verdict"].to_string();
+    assert!(verdict.contains("accepted"), "{verdict}");
+}
+
 /// A share between joints of two kinds has a unit; it is no percentage.
 #[test]
 fn a_large_share_between_unlike_joints_is_said_in_its_unit() {

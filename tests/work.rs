@@ -339,3 +339,82 @@ fn the_commands_use_what_a_run_wrote() {
         assert!(refused.stderr.contains(says), "{}", refused.stderr);
     }
 }
+
+/// A controller's table: its own names, a text column, decimal commas; the profile has a map for tables like it.
+#[test]
+fn a_controllers_table_is_read_by_the_map_of_a_profile() {
+    let done = crate::scratch::finished("ripley", "ml");
+    let folder = done.dir.path("out").display().to_string();
+    let model = format!("{folder}/ripley.calibrated.model.json");
+    let profile = "calib: 1
+robot: {name: ripley, urdf: r17.urdf}
+tracker: {frame: lab}
+bodies: {}
+recordings:
+  one:
+    file: one.csv
+    use: static
+    columns: &map
+      decimal_comma: true
+      angles: deg
+      joints: {waist: A1, shoulder: A2, elbow: A3, wrist_pitch: A4, wrist_roll: A5}
+  two: {file: two.csv, use: static, robot_log: {file: two_log.csv, columns: *map}}
+  three: {file: three.csv, use: static}
+";
+    let own = "name,waist_deg,shoulder_deg,elbow_deg,wrist_pitch_deg,wrist_roll_deg\n\
+               home,1.5,-20.25,30,40,50\nplace,-10,-30,20,10.5,0\n";
+    let foreign =
+        "Mode;A1;A2;A3;A4;A5;Gripper\nAUTO;1,5;-20,25;30;40;50;3,5\nAUTO;-10;-30;20;10,5;0;3,5\n";
+    let dir = Scratch::new()
+        .file("r.yaml", profile)
+        .file(
+            "r2.yaml",
+            profile.replace("*map", "{angles: rad, joints: {waist: A1}}"),
+        )
+        .file("own.csv", own)
+        .file("log.csv", foreign);
+    let wanted = dir.calib_with(&["predict", &model, "own.csv"]).expect(0);
+    let like = |file: &str, more: &[&str]| {
+        let base = ["predict", &model, "log.csv", "--profile", file];
+        dir.calib_with(&[&base, more].concat())
+    };
+    for more in [&[][..], &["--recording", "one"], &["--recording", "two"]] {
+        assert_eq!(
+            like("r.yaml", more).expect(0).stdout,
+            wanted.stdout,
+            "{more:?}"
+        );
+    }
+    let refused = dir.calib_with(&["predict", &model, "log.csv"]).expect(3);
+    assert!(refused.stderr.contains("column `A1`"), "{}", refused.stderr);
+    for (file, more, says) in [
+        (
+            "r.yaml",
+            &["--recording", "three"][..],
+            "recording `three` has no column map",
+        ),
+        (
+            "r.yaml",
+            &["--recording", "four"],
+            "there are one, three, two",
+        ),
+        ("r2.yaml", &[], "2 different column maps"),
+        ("none.yaml", &[], "none.yaml: cannot be read"),
+    ] {
+        let ran = like(file, more);
+        assert!(ran.code > 1 && ran.stderr.contains(says), "{}", ran.stderr);
+    }
+    let converted = ["convert", "log.csv", "out.csv", "--profile", "r.yaml"];
+    dir.calib_with(&converted).expect(0);
+    let wanted = wanted.stdout;
+    let again = dir
+        .calib_with(&["predict", &model, "out.csv"])
+        .expect(0)
+        .stdout;
+    let values = |text: &str| -> Vec<String> {
+        let rows = text.lines().skip(1);
+        rows.map(|row| row.split_once(',').expect("cells").1.to_owned())
+            .collect()
+    };
+    assert_eq!(values(&again), values(&wanted));
+}

@@ -60,6 +60,16 @@ pub enum CliError {
         /// What was given.
         bound: f64,
     },
+    /// A profile has no column map for a table.
+    #[error("{file}: {finding}\n  help: {remedy}")]
+    NoColumnMap {
+        /// The profile.
+        file: String,
+        /// What there is.
+        finding: String,
+        /// What to do.
+        remedy: &'static str,
+    },
     /// Of `calib fit`.
     #[error(transparent)]
     Fit(#[from] FitError),
@@ -236,6 +246,7 @@ impl CliError {
             | Self::NotATime { .. }
             | Self::NotANoiseFactor { .. }
             | Self::NotABound { .. }
+            | Self::NoColumnMap { .. }
             | Self::OtherPlugin { .. }
             | Self::Simulation { .. }
             | Self::Json { .. }

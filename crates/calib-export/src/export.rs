@@ -6,6 +6,7 @@ use calib_model::{LinkId, Model, ModelError, Place, Pose};
 use crate::cost::{Cost, anywhere, between, postures, truth};
 use crate::error::ExportError;
 use crate::geometric::{evaluated, geometric, lost};
+use crate::names::accepted;
 use crate::opw::{Axes, Opw, Readings, axes};
 use crate::read::Robot;
 use crate::target::Target;
@@ -19,6 +20,8 @@ pub struct Exported {
     pub text: String,
     /// What of the model the format cannot hold: joint effects, or a part of the geometry.
     pub lost: Vec<&'static str>,
+    /// Links that have another name in the file, in words.
+    pub renamed: Vec<String>,
     /// Position error of the tool against the model, that this costs.
     pub cost: Cost,
     /// The link or point whose error that is.
@@ -156,8 +159,15 @@ impl Asked<'_> {
                 seen = Some(self.held_out.iter().map(at).collect::<Vec<_>>());
                 yaml::poe(&self.head(&notes), &screws)
             }
-            Target::Mjcf => xml::mjcf(&alone, &notes),
-            Target::Sdf => xml::sdf(&alone, &notes),
+            Target::Mjcf | Target::Sdf => {
+                let (named, renamed) = accepted(alone.clone(), self.target);
+                notes.extend(renamed.iter().cloned());
+                out.renamed = renamed;
+                match self.target {
+                    Target::Mjcf => xml::mjcf(&named, &notes),
+                    _ => xml::sdf(&named, &notes),
+                }
+            }
             _ => xml::urdf(&alone, &notes),
         };
         if let Some(seen) = seen {
@@ -246,6 +256,7 @@ impl Asked<'_> {
         Exported {
             text: String::new(),
             lost,
+            renamed: Vec::new(),
             cost: between(held, &wanted),
             tool: self.tool.to_owned(),
         }

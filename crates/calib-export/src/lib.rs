@@ -22,6 +22,7 @@ mod dh;
 mod error;
 mod export;
 mod geometric;
+mod names;
 mod opw;
 mod poe;
 mod predict;

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use calib_finding::cell;
 use calib_model::{Approach, ModelError, Place, Scope, Under};
+use calib_recording::ColumnMap;
 use nalgebra::{Matrix3, Matrix6};
 
 use crate::error::ExportError;
@@ -32,6 +33,8 @@ pub struct PredictOptions {
     pub unordered: bool,
     /// The torques of the table load the joints, in place of gravity.
     pub torques: bool,
+    /// The map of a table that names its columns its own way.
+    pub columns: Option<ColumnMap>,
 }
 
 /// Predicted poses.
@@ -62,7 +65,7 @@ pub fn predict(
     table: &Path,
     options: &PredictOptions,
 ) -> Result<Predicted, ExportError> {
-    let program = program(table, &robot.model)?;
+    let program = program(table, robot, options.columns.as_ref())?;
     if options.torques && program.held.is_empty() {
         return Err(ExportError::Column {
             file: program.file,

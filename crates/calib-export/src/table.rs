@@ -59,13 +59,20 @@ impl Program {
     }
 }
 
-/// Reads a table of joint positions in any format that `calib` reads.
-pub(crate) fn program(path: &Path, model: &Model) -> Result<Program, ExportError> {
+/// Reads a table of joint positions in any format that `calib` reads; `columns`: the map of one that names them its own way.
+pub(crate) fn program(
+    path: &Path,
+    robot: &Robot,
+    columns: Option<&ColumnMap>,
+) -> Result<Program, ExportError> {
     let file = path.display().to_string();
+    let model = &robot.model;
     // Columns `x_mm`, `y_mm` and `z_mm` are those of a gantry's joints of these names.
     let options = ReadOptions {
         joints: model.joints().iter().map(|j| j.name.clone()).collect(),
         of_robot: true,
+        remarks: true,
+        columns: columns.cloned(),
         ..ReadOptions::default()
     };
     let recording = read_path(path, &options).or_else(|error| match *error.problem {
@@ -84,13 +91,23 @@ pub(crate) fn program(path: &Path, model: &Model) -> Result<Program, ExportError
         }
         _ => Err(error),
     })?;
-    let poses = recording
-        .poses(Filled::Include)
-        .map_err(|source| ExportError::NotOneTable {
-            file: file.clone(),
-            source,
-        })?;
+    let mut poses =
+        recording
+            .poses(Filled::Include)
+            .map_err(|source| ExportError::NotOneTable {
+                file: file.clone(),
+                source,
+            })?;
     let n = poses.rows.len();
+    // Of joints that follow others the model knows where they are, and a map may name more than the robot has.
+    let follows = |name: &String| {
+        let mut all = robot.file.joints.iter();
+        all.any(|j| j.name == *name && j.mimic.is_some())
+    };
+    let own = |name: &String| model.joints().iter().any(|j| j.name == *name);
+    let is_used = |name: &String| own(name) || columns.is_none() && !follows(name);
+    poses.joints.retain(|name, _| is_used(name));
+    poses.joint_units.retain(|name, _| is_used(name));
     fits(&file, &poses, model)?;
     let column = |name: &str| poses.joints.get(name);
     let row = |k: usize| -> Option<Vec<f64>> {
@@ -164,8 +181,12 @@ pub struct Region {
 ///
 /// # Errors
 /// [`ExportError`].
-pub fn region(path: &Path, robot: &Robot) -> Result<Region, ExportError> {
-    let program = program(path, &robot.model)?;
+pub fn region(
+    path: &Path,
+    robot: &Robot,
+    columns: Option<&ColumnMap>,
+) -> Result<Region, ExportError> {
+    let program = program(path, robot, columns)?;
     Ok(Region {
         postures: program.q.into_iter().flatten().collect(),
         absent: program.absent,

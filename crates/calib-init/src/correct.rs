@@ -113,8 +113,14 @@ fn really(mistake: UnitMistake) -> &'static str {
     match mistake {
         UnitMistake::DegreesReadAsRadians => "deg",
         UnitMistake::RadiansReadAsDegrees => "rad",
-        UnitMistake::MillimetersReadAsMeters => "mm",
-        UnitMistake::MetersReadAsMillimeters => "m",
+        UnitMistake::Length { unit, .. } => match unit {
+            Length::Meter => "m",
+            Length::Centimeter => "cm",
+            Length::Millimeter => "mm",
+            Length::Micrometer => "um",
+            Length::Inch => "in",
+            Length::Foot => "ft",
+        },
     }
 }
 

@@ -76,7 +76,7 @@ const LEAST_TURN: f64 = 0.05;
 const LEAST_WAY: f64 = 2e-3;
 
 fn of_readings(data: &Data, scopes: &[Scope], list: &mut Vec<Candidate>) {
-    use UnitMistake::*;
+    use UnitMistake::{DegreesReadAsRadians, RadiansReadAsDegrees};
     let joints = data.relevant_joints();
     let empty = data.assumed_zero();
     let mut add = |h: Hypothesis| list.push((h, scopes.to_vec()));
@@ -89,7 +89,10 @@ fn of_readings(data: &Data, scopes: &[Scope], list: &mut Vec<Candidate>) {
             let units = if revolute {
                 [DegreesReadAsRadians, RadiansReadAsDegrees]
             } else {
-                [MillimetersReadAsMeters, MetersReadAsMillimeters]
+                [
+                    UnitMistake::MILLIMETERS_READ_AS_METERS,
+                    UnitMistake::METERS_READ_AS_MILLIMETERS,
+                ]
             };
             // A unit that leaves a joint hardly any motion says that it stood still: that is another mistake.
             let least = if revolute { LEAST_TURN } else { LEAST_WAY };
@@ -139,12 +142,12 @@ fn of_readings(data: &Data, scopes: &[Scope], list: &mut Vec<Candidate>) {
         let moves = |j: &&JointIndex| span(data, **j) > MOVES;
         joints.iter().filter(of_kind).filter(moves).count()
     };
-    for mistake in [
-        DegreesReadAsRadians,
-        RadiansReadAsDegrees,
-        MillimetersReadAsMeters,
-        MetersReadAsMillimeters,
-    ] {
+    // All lengths of a robot in one unit, and all of the tracker in one: of a robot that only slides, its own are as good a guess.
+    let lengths = TRACKER_UNITS.map(|(unit, read_as)| UnitMistake::Length { unit, read_as });
+    for mistake in [DegreesReadAsRadians, RadiansReadAsDegrees]
+        .into_iter()
+        .chain(lengths)
+    {
         if moving(mistake.of_angles()) > 1 {
             add(Hypothesis::Units { mistake });
         }

@@ -16,13 +16,27 @@ pub enum UnitMistake {
     DegreesReadAsRadians,
     /// Values in radians, read as degrees.
     RadiansReadAsDegrees,
-    /// Values in millimeters, read as meters.
-    MillimetersReadAsMeters,
-    /// Values in meters, read as millimeters.
-    MetersReadAsMillimeters,
+    /// Lengths.
+    Length {
+        /// What the values are.
+        unit: Length,
+        /// What they were read as.
+        read_as: Length,
+    },
 }
 
 impl UnitMistake {
+    /// Millimeters, read as meters.
+    pub const MILLIMETERS_READ_AS_METERS: Self = Self::Length {
+        unit: Length::Millimeter,
+        read_as: Length::Meter,
+    };
+    /// Meters, read as millimeters.
+    pub const METERS_READ_AS_MILLIMETERS: Self = Self::Length {
+        unit: Length::Meter,
+        read_as: Length::Millimeter,
+    };
+
     /// Whether it is a unit of angle.
     #[must_use]
     pub fn of_angles(self) -> bool {
@@ -38,8 +52,7 @@ impl UnitMistake {
         match self {
             Self::DegreesReadAsRadians => PI / 180.0,
             Self::RadiansReadAsDegrees => 180.0 / PI,
-            Self::MillimetersReadAsMeters => 1e-3,
-            Self::MetersReadAsMillimeters => 1e3,
+            Self::Length { unit, read_as } => unit.meters() / read_as.meters(),
         }
     }
 }

@@ -405,8 +405,8 @@ pub fn fault(data: &Data, rng: &mut ChaCha8Rng) -> Scoped {
                 let mistake = match (revolute(joint), rng.random_bool(0.5)) {
                     (true, true) => UnitMistake::DegreesReadAsRadians,
                     (true, false) => UnitMistake::RadiansReadAsDegrees,
-                    (false, true) => UnitMistake::MillimetersReadAsMeters,
-                    (false, false) => UnitMistake::MetersReadAsMillimeters,
+                    (false, true) => UnitMistake::MILLIMETERS_READ_AS_METERS,
+                    (false, false) => UnitMistake::METERS_READ_AS_MILLIMETERS,
                 };
                 Hypothesis::Unit { joint, mistake }
             }
@@ -475,8 +475,10 @@ pub fn with_fault(setting: &Setting, data: &Data, fault: &Scoped) -> Data {
             let mistake = match mistake {
                 UnitMistake::DegreesReadAsRadians => UnitMistake::RadiansReadAsDegrees,
                 UnitMistake::RadiansReadAsDegrees => UnitMistake::DegreesReadAsRadians,
-                UnitMistake::MillimetersReadAsMeters => UnitMistake::MetersReadAsMillimeters,
-                UnitMistake::MetersReadAsMillimeters => UnitMistake::MillimetersReadAsMeters,
+                UnitMistake::Length { unit, read_as } => UnitMistake::Length {
+                    unit: read_as,
+                    read_as: unit,
+                },
             };
             undo(Hypothesis::Unit { joint, mistake })
         }

@@ -13,6 +13,7 @@ use calib_recording::{
 };
 use clap::Args;
 
+use super::like::Like;
 use super::names::names_of;
 use super::plugin_options::NamedPlugins;
 use crate::error::CliError;
@@ -28,6 +29,9 @@ pub struct Convert {
     /// Reader to use [default: detected from the content]
     #[arg(long)]
     format: Option<String>,
+    /// Column map of the recording
+    #[command(flatten)]
+    like: Like,
     /// Name to write for a body or marker and its name in the recording, as `gripM=body_0`
     #[arg(long, value_delimiter = ',')]
     map: Vec<String>,
@@ -97,6 +101,7 @@ fn convert(options: &Convert, progress: &mut dyn FnMut(u64, u64)) -> Result<Conv
         input,
         output,
         format,
+        like,
         map,
         plugins,
     } = options;
@@ -110,6 +115,7 @@ fn convert(options: &Convert, progress: &mut dyn FnMut(u64, u64)) -> Result<Conv
         None => {
             let options = ReadOptions {
                 format: format.clone(),
+                columns: like.map(input, false)?,
                 ..ReadOptions::default()
             };
             read_path_with(input, &options, progress)?

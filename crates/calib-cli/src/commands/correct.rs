@@ -7,6 +7,7 @@ use calib_model::file::RobotModelFile;
 use calib_pipeline::ExitCode;
 use clap::Args;
 
+use super::like::Like;
 use super::plugin_options::Evaluated;
 use super::predict::{say_absent, say_assumed, say_rejected, write};
 use crate::error::CliError;
@@ -31,6 +32,9 @@ pub struct Correct {
     /// Largest change of a sliding joint, mm [default: 50; 1000 for poses]
     #[arg(long, value_name = "MM")]
     largest_mm: Option<f64>,
+    /// Column map of the table
+    #[command(flatten)]
+    like: Like,
     /// Plugin that computes an effect of the robot, by name or path; can be given several times
     #[arg(long, value_name = "PLUGIN")]
     plugin: Vec<String>,
@@ -56,6 +60,7 @@ pub fn run(console: &Console, options: &Correct) -> Result<ExitCode, CliError> {
         position_only: options.position_only,
         largest_rad: options.largest_deg.map(f64::to_radians),
         largest_m: options.largest_mm.map(|mm| 1e-3 * mm),
+        columns: options.like.map(&options.program, true)?,
     };
     let done = correct(robot, &options.program, &with)?;
     with_plugins.evaluated()?;

@@ -7,6 +7,7 @@ use calib_pipeline::ExitCode;
 use clap::Args;
 use clap::builder::{PossibleValue, PossibleValuesParser, TypedValueParser};
 
+use super::like::Like;
 use super::predict::{say_absent, say_rejected, write};
 use crate::error::CliError;
 use crate::terminal::{Console, say_note};
@@ -26,6 +27,9 @@ pub struct Export {
     /// others [default: the fitted range of every joint]
     #[arg(long, value_name = "TABLE")]
     region: Option<PathBuf>,
+    /// Column map of the region's table
+    #[command(flatten)]
+    like: Like,
     /// The file to write; it must not exist [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     out: Option<PathBuf>,
@@ -42,7 +46,10 @@ fn formats() -> impl TypedValueParser<Value = Target> {
 pub fn run(console: &Console, options: &Export) -> Result<ExitCode, CliError> {
     let robot = robot(&options.model)?;
     let region = match &options.region {
-        Some(table) => Some(region(table, &robot)?),
+        Some(table) => {
+            let columns = options.like.map(table, true)?;
+            Some(region(table, &robot, columns.as_ref())?)
+        }
         None => None,
     };
     let rows = region.as_ref().map(|region| region.postures.as_slice());
@@ -64,6 +71,11 @@ pub fn run(console: &Console, options: &Export) -> Result<ExitCode, CliError> {
             done.cost.postures
         );
         say_note(console, &note);
+    }
+    if !console.quiet {
+        for renamed in &done.renamed {
+            say_note(console, renamed);
+        }
     }
     write(console, options.out.as_ref(), &done.text)
 }

@@ -12,6 +12,7 @@ pub mod export;
 pub mod fit;
 pub mod history;
 pub mod init;
+mod like;
 pub mod man;
 pub mod merge;
 mod names;

@@ -9,6 +9,7 @@ use calib_pipeline::ExitCode;
 use clap::{Args, ValueEnum};
 use serde_json::json;
 
+use super::like::Like;
 use super::plugin_options::Evaluated;
 use crate::error::CliError;
 use crate::terminal::{Console, emit, emit_paths, emit_written, say_note};
@@ -35,6 +36,9 @@ pub struct Predict {
     /// The torques of the table load the joints, in place of gravity
     #[arg(long)]
     torques: bool,
+    /// Column map of the table
+    #[command(flatten)]
+    like: Like,
     /// Plugin that computes an effect of the robot, by name or path; can be given several times
     #[arg(long, value_name = "PLUGIN")]
     plugin: Vec<String>,
@@ -63,6 +67,7 @@ pub fn run(console: &Console, options: &Predict) -> Result<ExitCode, CliError> {
         },
         unordered: options.unordered,
         torques: options.torques,
+        columns: options.like.map(&options.table, true)?,
     };
     let done = predict(&robot.robot, &options.table, &with)?;
     robot.evaluated()?;

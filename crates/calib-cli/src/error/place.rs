@@ -79,6 +79,7 @@ impl CliError {
             Self::Export(ExportError::Table(_)) => "recording",
             Self::Export(_) => "model",
             Self::NotABound { .. } => "correct",
+            Self::NoColumnMap { .. } => "profile",
             Self::OtherPlugin { .. } => "plugin",
             Self::Fit(_) => "fit",
             Self::File(error) => of_file(error),

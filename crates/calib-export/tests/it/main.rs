@@ -2,6 +2,7 @@
 
 mod arms;
 mod exports;
+mod names;
 mod tables;
 
 /// Robots by chance.

@@ -7,6 +7,7 @@ use calib_files::input;
 use calib_finding::{About, Fact, Finding, catalog};
 use calib_plugin::OwnEntries;
 use calib_profile::Profile;
+use calib_profile::raw::RawProfile;
 use calib_urdf::{Problem, ReadError, ReadProblem, RobotModel, doubt, sha256_hex};
 
 use crate::error::{NamedBy, PipelineError, WhyUnread};
@@ -26,6 +27,16 @@ pub fn load_robot(profile_path: &Path) -> Result<RobotProfile, PipelineError> {
     load_robot_with(profile_path, &OwnEntries::default())
 }
 
+/// A profile as it is written, with its text; nothing of it is checked against a robot.
+///
+/// # Errors
+/// [`PipelineError`] for a file that cannot be read, or is no profile.
+pub fn read_profile(path: &Path) -> Result<(RawProfile, String), PipelineError> {
+    let text = read_text(path, &NamedBy::Caller)?;
+    let raw = calib_profile::parse(&text, &path.display().to_string())?;
+    Ok((raw, text))
+}
+
 /// [`load_robot`] for a profile that may name estimators of the calling program.
 ///
 /// # Errors
@@ -35,8 +46,7 @@ pub fn load_robot_with(
     own: &OwnEntries,
 ) -> Result<RobotProfile, PipelineError> {
     let shown = profile_path.display().to_string();
-    let text = read_text(profile_path, &NamedBy::Caller)?;
-    let raw = calib_profile::parse(&text, &shown)?;
+    let (raw, text) = read_profile(profile_path)?;
     let folder = profile_path
         .parent()
         .map_or_else(PathBuf::new, Path::to_path_buf);

@@ -10,6 +10,7 @@ use calib_core::{EffectKind, ParameterEstimate, ParameterKind, Settings};
 use calib_finding::{Fact, Finding, Severity, Subject, Unit, catalog};
 use calib_report::RobotChange;
 use calib_urdf::{JointId, RobotModel};
+use statrs::distribution::{ChiSquared, ContinuousCDF as _};
 
 use crate::formulate::checked::Checked;
 use crate::formulate::formulation::{FreeSet, MlFit};
@@ -20,8 +21,8 @@ use crate::verify::robot_changes::robot_changes;
 
 /// Prior σ of a ratio, as a share of it: tendons and linkages of hands.
 const WIDE: f64 = 0.25;
-/// A ratio this many standard deviations from the stated one is another: one right one of eighty is called so.
-const CLEAR: f64 = 2.5;
+/// Chance that any ratio of a robot is called another though all are right.
+const CHANCE: f64 = 0.01;
 /// A ratio this many standard deviations from the stated one refutes the URDF: lengths and zeros that were fitted with it are not those of the robot.
 const REFUTED: f64 = 5.0;
 /// A standard deviation that grows by this factor was one of a condition, and so was a number that changes by as many of them.
@@ -50,8 +51,9 @@ pub(super) fn ratios(inputs: &Inputs, checked: &Checked, fit: &MlFit) -> Ratios 
     };
     let after = changes(&wide, &freed);
     let model = &inputs.robot.model;
+    let clear = clear(followers.len());
     let of_joint = |joint: &JointId| {
-        let found = of_follower(model, *joint, &freed, (&before, &after));
+        let found = of_follower(model, *joint, (&freed, clear), (&before, &after));
         found.or_else(|| alone(inputs, *joint, &freed))
     };
     let wider = before.iter().filter_map(|b| {
@@ -62,6 +64,13 @@ pub(super) fn ratios(inputs: &Inputs, checked: &Checked, fit: &MlFit) -> Ratios 
         findings: followers.iter().filter_map(of_joint).collect(),
         sigmas: wider.collect(),
     }
+}
+
+/// How many standard deviations from the stated one make a ratio another, where so many are asked.
+fn clear(ratios: usize) -> f64 {
+    let of_one = ChiSquared::new(1.0).ok();
+    let limit = of_one.map(|d| d.inverse_cdf(1.0 - CHANCE / ratios.max(1) as f64));
+    limit.map_or(REFUTED, f64::sqrt)
 }
 
 /// Joints that mimic another, have no readings of their own, and whose ratio the fit holds.
@@ -161,7 +170,7 @@ fn alone(inputs: &Inputs, joint: JointId, freed: &MlFit) -> Option<Finding> {
 fn of_follower(
     model: &RobotModel,
     joint: JointId,
-    freed: &MlFit,
+    (freed, clear): (&MlFit, f64),
     (before, after): (&[RobotChange], &[RobotChange]),
 ) -> Option<Finding> {
     let joint = model.joint(joint);
@@ -186,7 +195,7 @@ fn of_follower(
         size.abs() > least
     };
     let both: Vec<_> = both.collect();
-    let is_another = gain.value.abs() > CLEAR * sigma;
+    let is_another = gain.value.abs() > clear * sigma;
     let moved = both
         .iter()
         .map(|&(b, a, stated, now)| ((a.value - b.value).abs() / stated, (b, a, stated, now)));

@@ -105,6 +105,7 @@ fn read(input: &mut dyn Input, options: &ReadOptions) -> Placed<Recording> {
     let known = Known {
         joints: &options.joints,
         of_robot: options.of_robot,
+        remarks: options.remarks.then_some(&[]),
     };
     let input = BufReader::with_capacity(1 << 16, input);
     let mut recording = read_table(input, map.as_ref(), known)?;

@@ -40,6 +40,8 @@ pub struct ReadOptions {
     pub joints: Vec<String>,
     /// The robot's own log: a table of three coordinates without a name is one of joints of these names, and of no marker.
     pub of_robot: bool,
+    /// Columns that no rule knows and that begin with a word are somebody's remarks, and are left out.
+    pub remarks: bool,
     /// Files above this size are refused, bytes.
     pub max_bytes: u64,
 }
@@ -54,6 +56,7 @@ impl Default for ReadOptions {
             rotation: None,
             joints: Vec::new(),
             of_robot: false,
+            remarks: false,
             max_bytes: 8 << 30,
         }
     }

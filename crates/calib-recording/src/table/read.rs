@@ -38,6 +38,11 @@ pub(crate) fn read_table(
         first.extend(first_row(&mut lines, separator)?);
     }
     let dates = dates(first.last(), separator);
+    let words = words(first.last(), separator);
+    let known = Known {
+        remarks: known.remarks.map(|_| words.as_slice()),
+        ..known
+    };
     let layout = Layout::new(number, names, (units.as_ref(), &dates), (map, known))?;
     let mut body = Body {
         live: comments.iter().any(|comment| comment == WRITTEN_LIVE),
@@ -78,6 +83,19 @@ fn dates(first: Option<&Line>, separator: Separator) -> Vec<bool> {
     let of = |(_, line, _): &Line| {
         let cells = cells(line, separator);
         cells.map(|cell| date_time(cell).is_some()).collect()
+    };
+    first.map(of).unwrap_or_default()
+}
+
+/// Which columns of the first row hold a word.
+fn words(first: Option<&Line>, separator: Separator) -> Vec<bool> {
+    let of = |(_, line, _): &Line| {
+        let cells = cells(line, separator);
+        let words = cells.map(|cell| {
+            let cell = unquoted(cell);
+            cell.contains(char::is_alphabetic) && cell.trim().parse::<f64>().is_err()
+        });
+        words.collect()
     };
     first.map(of).unwrap_or_default()
 }

@@ -181,6 +181,16 @@ pub enum EditError {
         template: String,
     },
     #[error(
+        "{file}:{place}: this file has no joint `{joint}`: `{template}` is `{named}` here\n  help: name the file whose xacro gives `{joint}`, or apply the result to the expanded URDF"
+    )]
+    XacroNamed {
+        file: String,
+        place: Place,
+        joint: String,
+        template: String,
+        named: String,
+    },
+    #[error(
         "{file}:{place}: joint `{joint}` stands in the macro `{macro_name}`, which is used {}: one text, several joints\n  help: patch the expanded URDF, or give the macro a parameter for this origin",
         uses(lines)
     )]

@@ -7,6 +7,7 @@
 mod call;
 pub mod companions;
 mod expression;
+mod named;
 pub mod origins;
 pub(crate) mod value;
 
@@ -60,7 +61,17 @@ pub(crate) fn joint<'a, 'b>(
             if enclosing_macro(node).is_none() && !has_fixed_part(node) {
                 return Err(template(file, place(node), name, node));
             }
-            Ok(node)
+            let written = node.own("name").unwrap_or("");
+            match named::given(document, node, written) {
+                Some(named) if named != name => Err(EditError::XacroNamed {
+                    file: file.to_owned(),
+                    place: place(node),
+                    joint: name.to_owned(),
+                    template: written.to_owned(),
+                    named,
+                }),
+                _ => Ok(node),
+            }
         }
         [] => Err(match templates.first() {
             Some(node) => template(file, place(*node), name, *node),

@@ -257,7 +257,7 @@ fn yaml_value(
 }
 
 /// The one definition of a property, directly under `<robot>`; `None` where another one might count.
-fn definition<'a, 'b>(document: &'a Document<'b>, name: &str) -> Option<Node<'a, 'b>> {
+pub(crate) fn definition<'a, 'b>(document: &'a Document<'b>, name: &str) -> Option<Node<'a, 'b>> {
     let mut definitions = document
         .descendants()
         .filter(|node| is_xacro(*node, "property") && node.own("name") == Some(name));

@@ -143,7 +143,6 @@ fn unit(mistake: UnitMistake) -> &'static str {
     match mistake {
         UnitMistake::DegreesReadAsRadians => "deg",
         UnitMistake::RadiansReadAsDegrees => "rad",
-        UnitMistake::MillimetersReadAsMeters => "mm",
-        UnitMistake::MetersReadAsMillimeters => "m",
+        UnitMistake::Length { unit, .. } => length(unit),
     }
 }

@@ -55,17 +55,16 @@ pub(super) fn with_remedy(
 }
 
 fn remedy(column: &JointColumn, mistake: UnitMistake) -> Remedy {
-    let length = |thousand: f64| {
+    let length = |smaller: f64| {
         let read = LengthUnit::from_name(column.unit)?.per_meter();
         let mut all = LengthUnit::ALL.into_iter();
-        let unit = all.find(|unit| (unit.per_meter() / read / thousand - 1.0).abs() < 1e-9);
+        let unit = all.find(|unit| (unit.per_meter() / read / smaller - 1.0).abs() < 1e-9);
         unit.map(LengthUnit::name)
     };
     let unit = match mistake {
         UnitMistake::DegreesReadAsRadians => (column.unit == "rad").then_some("deg"),
         UnitMistake::RadiansReadAsDegrees => (column.unit == "deg").then_some("rad"),
-        UnitMistake::MillimetersReadAsMeters => length(1e3),
-        UnitMistake::MetersReadAsMillimeters => length(1e-3),
+        UnitMistake::Length { .. } => length(mistake.factor().recip()),
     };
     let Some(unit) = unit else {
         return Remedy::Twice;
@@ -78,13 +77,17 @@ fn remedy(column: &JointColumn, mistake: UnitMistake) -> Remedy {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use calib_checks::structural::Length;
     use calib_finding::{Subject, catalog};
 
     #[test]
     fn a_name_that_states_the_unit_already_is_not_asked_for() {
-        use UnitMistake::{
-            DegreesReadAsRadians, MetersReadAsMillimeters, MillimetersReadAsMeters,
-            RadiansReadAsDegrees,
+        use UnitMistake::{DegreesReadAsRadians, RadiansReadAsDegrees};
+        let small = UnitMistake::MILLIMETERS_READ_AS_METERS;
+        let large = UnitMistake::METERS_READ_AS_MILLIMETERS;
+        let ten = UnitMistake::Length {
+            unit: Length::Centimeter,
+            read_as: Length::Millimeter,
         };
         let rename = |name: &str| Remedy::Rename(name.to_owned());
         for (name, unit, mistake, wanted) in [
@@ -93,11 +96,13 @@ mod tests {
             ("a5_deg", "deg", DegreesReadAsRadians, Remedy::Twice),
             ("A5", "deg", RadiansReadAsDegrees, rename("A5_rad")),
             ("a5_rad", "rad", RadiansReadAsDegrees, Remedy::Twice),
-            ("rail_m", "m", MillimetersReadAsMeters, rename("rail_mm")),
-            ("rail_mm", "mm", MillimetersReadAsMeters, rename("rail_um")),
-            ("rail_um", "um", MillimetersReadAsMeters, Remedy::Twice),
-            ("rail_mm", "mm", MetersReadAsMillimeters, rename("rail_m")),
-            ("rail_m", "m", MetersReadAsMillimeters, Remedy::Twice),
+            ("rail_m", "m", small, rename("rail_mm")),
+            ("rail_mm", "mm", small, rename("rail_um")),
+            ("rail_um", "um", small, Remedy::Twice),
+            ("rail_mm", "mm", large, rename("rail_m")),
+            ("rail_m", "m", large, Remedy::Twice),
+            ("rail_mm", "mm", ten, rename("rail_cm")),
+            ("rail_m", "m", ten, Remedy::Twice),
         ] {
             let column = JointColumn {
                 name: name.to_owned(),

@@ -90,6 +90,24 @@ pub(super) fn with_evidence(
             "alternatives",
             names(named.alternatives.iter().map(|a| code(&a.0)).collect()),
         )
+        .with_some("slides_unit", as_good(named, true).map(Fact::name))
+        .with_some("tracker_unit", as_good(named, false).map(Fact::name))
+}
+
+/// The unit of the prismatic joints, or of the tracker, that explains the recordings as well or nearly as well.
+fn as_good(named: &Named, of_slides: bool) -> Option<&'static str> {
+    let nearly = named.alternatives.iter().map(|(correction, _)| correction);
+    let mut all = named.equivalent.iter().chain(nearly);
+    all.find_map(|correction| match correction.as_slice() {
+        [one] => match one.hypothesis {
+            Hypothesis::TrackerUnit { unit, .. } if !of_slides => Some(codes::length(unit)),
+            Hypothesis::Units {
+                mistake: UnitMistake::Length { unit, .. },
+            } if of_slides => Some(codes::length(unit)),
+            _ => None,
+        },
+        _ => None,
+    })
 }
 
 /// Several columns in another order.
@@ -241,6 +259,13 @@ fn of_hypothesis(layout: &Layout<'_>, outcome: &Outcome, scoped: &Scoped) -> Fin
         Hypothesis::Units { mistake } => {
             let kind = of_all_joints(mistake);
             let finding = Finding::of_kind(catalog::UNIT_MISMATCH, kind, Subject::default());
+            let finding = match mistake {
+                UnitMistake::Length { unit, read_as } if kind == "all_lengths" => finding
+                    .with("unit", Fact::name(codes::length(unit)))
+                    .with("read_as", Fact::name(codes::length(read_as)))
+                    .with("factor", Fact::ratio(mistake.factor())),
+                _ => finding,
+            };
             columns::with_remedy(layout, finding, None, mistake, scoped.scope)
         }
         _ => of_tracker(layout, scoped),
@@ -339,8 +364,8 @@ fn of_one_joint(mistake: UnitMistake) -> &'static str {
     match mistake {
         UnitMistake::DegreesReadAsRadians => "joint_degrees",
         UnitMistake::RadiansReadAsDegrees => "joint_radians",
-        UnitMistake::MillimetersReadAsMeters => "joint_millimeters",
-        UnitMistake::MetersReadAsMillimeters => "joint_meters",
+        UnitMistake::Length { .. } if mistake.factor() < 1.0 => "joint_millimeters",
+        UnitMistake::Length { .. } => "joint_meters",
     }
 }
 
@@ -348,7 +373,8 @@ fn of_all_joints(mistake: UnitMistake) -> &'static str {
     match mistake {
         UnitMistake::DegreesReadAsRadians => "all_degrees",
         UnitMistake::RadiansReadAsDegrees => "all_radians",
-        UnitMistake::MillimetersReadAsMeters => "all_millimeters",
-        UnitMistake::MetersReadAsMillimeters => "all_meters",
+        UnitMistake::MILLIMETERS_READ_AS_METERS => "all_millimeters",
+        UnitMistake::METERS_READ_AS_MILLIMETERS => "all_meters",
+        UnitMistake::Length { .. } => "all_lengths",
     }
 }

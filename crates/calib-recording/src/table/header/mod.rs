@@ -24,6 +24,16 @@ pub(crate) struct Known<'a> {
     pub joints: &'a [String],
     /// Whether the table is its own log.
     pub of_robot: bool,
+    /// The columns that begin with a word, where those that no rule knows are remarks.
+    pub remarks: Option<&'a [bool]>,
+}
+
+impl Known<'_> {
+    /// Whether a column is somebody's remark, if no rule knows it.
+    pub(super) fn is_remark(&self, column: usize) -> bool {
+        let words = self.remarks.and_then(|words| words.get(column));
+        words == Some(&true)
+    }
 }
 
 /// Meaning of one column.

@@ -153,7 +153,7 @@ impl Layout {
                 | Meaning::Entity
                 | Meaning::Unknown => {
                     // A speed or a current is not read, and says so.
-                    let other = stated(i) == Some(StatedUnit::Other);
+                    let other = stated(i) == Some(StatedUnit::Other) || known.is_remark(i);
                     let own = &self.names[i];
                     if !lenient && !other && !name.is_empty() {
                         return Err(unknown(own));
