@@ -34,6 +34,7 @@ fn answers_have_their_keys() {
         assert!(keys(&cor).contains(&key), "cor has no {key}");
     }
     assert_near("center", &cor["center_m"], [100.0, 200.0, 300.0], 1e-6);
+    assert_eq!(cor["covariance_of"].as_array().expect("names").len(), 3);
     let sphere = dir
         .calib(["fit", "cor", "pivot.csv", "--estimator", "sfe", "--json"])
         .expect(0)
@@ -104,6 +105,11 @@ fn what_cannot_be_observed_ends_with_four() {
         (numbers(&axis["direction"])[2].abs() - 1.0).abs() < 1e-9,
         "{axis}"
     );
+    // Along itself a direction does not vary.
+    let of = axis["covariance_of"].as_array().expect("names");
+    let along = of.iter().position(|name| name == "direction_z");
+    let along = &axis["covariance"][along.expect("named")];
+    assert!(numbers(along).iter().all(|c| c.abs() < 1e-9), "{axis}");
 }
 
 /// A weak answer is shown, with its doubt, and does not pass for a good one.

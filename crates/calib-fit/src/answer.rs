@@ -20,6 +20,27 @@ pub struct Answer {
     pub observable: bool,
 }
 
+/// What the rows and columns of a center's covariance are of.
+pub(crate) const OF_CENTER: [&str; 3] = ["center_x_m", "center_y_m", "center_z_m"];
+/// The same of an axis.
+pub(crate) const OF_LINE: [&str; 6] = [
+    "direction_x",
+    "direction_y",
+    "direction_z",
+    "point_x_m",
+    "point_y_m",
+    "point_z_m",
+];
+/// The same of a frame: small rotations about and translations along its own axes.
+pub(crate) const OF_FRAME: [&str; 6] = [
+    "about_x_rad",
+    "about_y_rad",
+    "about_z_rad",
+    "along_x_m",
+    "along_y_m",
+    "along_z_m",
+];
+
 pub(crate) fn answer(text: String, value: &Value, observable: bool) -> Answer {
     let json = calib_report::json::pretty(&calib_report::json::rounded(value.clone())) + "\n";
     Answer {

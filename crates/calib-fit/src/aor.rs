@@ -7,7 +7,9 @@ use calib_estimator::Kind;
 use serde_json::json;
 
 use crate::TableRequest;
-use crate::answer::{Answer, answer, contradicted, coordinates, copied, doubt, freedom, matrix};
+use crate::answer::{
+    Answer, OF_LINE, answer, contradicted, coordinates, copied, doubt, freedom, matrix,
+};
 use crate::comparison::{Found, Quantity};
 use crate::error::FitError;
 use crate::explained::{self, Against, Judged};
@@ -103,6 +105,7 @@ fn aor_answer(request: &TableRequest, table: &Table, id: &str, e: &AorEstimate) 
         "point_m": e.line.point.coords.as_slice(),
         "direction": e.line.direction.as_slice(),
         "covariance": matrix(&e.covariance),
+        "covariance_of": OF_LINE,
         "degrees_of_freedom": e.degrees_of_freedom,
         "contradicts": e.contradicts,
         "marker_noise": against.noise.map(|n| n.value()),

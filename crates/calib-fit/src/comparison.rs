@@ -57,11 +57,11 @@ impl Quantity {
         }
     }
 
-    /// Behind the coordinates; those of a direction have no unit.
-    fn unit(self) -> &'static str {
+    /// What the columns of the table are; coordinates of a direction have no unit.
+    fn heads(self) -> [&'static str; 3] {
         match self {
-            Self::Place(_) => " m",
-            Self::Direction(_) => "",
+            Self::Place(_) => ["place, m", "σ, mm", "off, mm"],
+            Self::Direction(_) => ["direction", "σ, deg", "off, deg"],
         }
     }
 
@@ -101,8 +101,8 @@ impl Quantity {
 
     fn shown(self, length: f64) -> String {
         match self {
-            Self::Place(_) => format!("{:.4} mm", length * 1e3),
-            Self::Direction(_) => format!("{:.4} deg", length.to_degrees()),
+            Self::Place(_) => format!("{:.4}", length * 1e3),
+            Self::Direction(_) => format!("{:.4}", length.to_degrees()),
         }
     }
 }
@@ -112,6 +112,14 @@ pub(crate) fn comparison(quantity: Quantity, lines: &[Line]) -> Answer {
     let reference = lines.iter().find(|l| l.verdict == "ok");
     let reference = reference.and_then(|l| l.found.as_ref());
     let mut text = String::new();
+    if lines.iter().any(|line| line.found.is_some()) {
+        let [place, sigma, off] = quantity.heads();
+        let _ = writeln!(
+            text,
+            "{:<16}      {place:<32} {sigma:>8} {off:>8}",
+            "estimator"
+        );
+    }
     let mut values = Vec::new();
     for Line {
         id,
@@ -129,15 +137,14 @@ pub(crate) fn comparison(quantity: Quantity, lines: &[Line]) -> Answer {
         let distance = reference.map(|r| quantity.distance(value, &r.value));
         let agrees = reference.is_some_and(|r| quantity.agree(found, r));
         let compared = match distance.map(|d| quantity.shown(d)) {
-            Some(off) => format!("off {off}  {}", if agrees { "agrees" } else { "DIFFERS" }),
+            Some(off) => format!("{off:>8}{}", if agrees { "" } else { " DIFFERS" }),
             // Nothing to compare with: what stands against it is the news.
             None => format!("\n  {reason}"),
         };
         let _ = writeln!(
             text,
-            "{id:<16} {verdict:<6} {}{}  sigma {}  {compared}",
+            "{id:<16} {verdict:<4} {:<32} {:>8} {compared}",
             coordinates(value.as_slice()),
-            quantity.unit(),
             quantity.shown(*sigma),
         );
         values.push(json!({

@@ -7,7 +7,9 @@ use calib_estimator::Kind;
 use serde_json::json;
 
 use crate::TableRequest;
-use crate::answer::{Answer, answer, contradicted, coordinates, copied, doubt, freedom, matrix};
+use crate::answer::{
+    Answer, OF_CENTER, answer, contradicted, coordinates, copied, doubt, freedom, matrix,
+};
 use crate::comparison::{Found, Quantity};
 use crate::error::FitError;
 use crate::explained::{self, Against, Judged};
@@ -169,6 +171,7 @@ fn cor_answer(request: &TableRequest, table: &Table, id: &str, e: &CorEstimate) 
         _ => {}
     }
     value["covariance"] = matrix(&e.covariance);
+    value["covariance_of"] = json!(OF_CENTER);
     value["contradicts"] = json!(e.noise.contradicts);
     value["marker_noise"] = json!(against.noise.map(|n| n.value()));
     value["degrees_of_freedom"] = json!(e.degrees_of_freedom);

@@ -10,7 +10,7 @@ use calib_estimator::{CenterBy, Input, Kind, Verdict};
 use calib_recording::ReadOptions;
 use serde_json::json;
 
-use crate::answer::{Answer, answer, doubt, matrix, pose_text, pose_value};
+use crate::answer::{Answer, OF_FRAME, answer, doubt, matrix, pose_text, pose_value};
 use crate::comparison::{Found, Quantity, in_parent};
 use crate::error::FitError;
 use crate::road::{Command, Data, Road, Wish};
@@ -127,6 +127,7 @@ fn frame_answer(id: &str, f: &FrameEstimate, rejected: &[u64]) -> Answer {
         "reason": f.reason,
         "body_from_joint": pose_value(&f.body_from_joint),
         "covariance": matrix(&f.covariance),
+        "covariance_of": OF_FRAME,
         "orthogonality_defect_rad": f.orthogonality_defect,
         "rms_m": f.rms_t,
         "rms_rad": f.rms_r,

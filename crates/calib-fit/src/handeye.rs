@@ -12,7 +12,9 @@ use nalgebra::{Isometry3, Matrix3, Translation3, Vector3};
 use serde_json::{Value, json};
 
 use crate::HandEyeRequest;
-use crate::answer::{Answer, answer, copied, doubt, freedom, matrix, pose_text, pose_value};
+use crate::answer::{
+    Answer, OF_FRAME, answer, copied, doubt, freedom, matrix, pose_text, pose_value,
+};
 use crate::comparison::{Found, Quantity, in_parent};
 use crate::error::FitError;
 use crate::measured::Measured;
@@ -204,6 +206,13 @@ fn read_by_names(table: &Measured, robot: &str, measured: &str) -> Result<Poses,
     found.unwrap_or_else(|| read(&robots[0], &bodies[0]))
 }
 
+/// What the rows and columns of the covariance are of: X, then Z, each in its own axes.
+fn of_both() -> Vec<String> {
+    let both = ["x", "z"].into_iter();
+    both.flat_map(|of| OF_FRAME.map(|name| format!("{of}.{name}")))
+        .collect()
+}
+
 /// `rows`: of the poses, in the file.
 fn handeye_answer(
     request: &HandEyeRequest,
@@ -226,6 +235,7 @@ fn handeye_answer(
         "x_urdf": observable.then(|| origin_value(&e.x)),
         "camera_link_urdf": camera.as_ref().map(origin_value),
         "covariance": e.covariance.as_ref().map(matrix),
+        "covariance_of": of_both(),
         "degrees_of_freedom": e.noise.degrees_of_freedom,
         "sigma_m": e.noise.sigma_t,
         "sigma_rad": e.noise.sigma_r,

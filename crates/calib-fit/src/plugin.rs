@@ -9,7 +9,7 @@ use calib_plugin::{
 };
 use serde_json::{Value, json};
 
-use crate::answer::{Answer, answer, coordinates, copied, doubt};
+use crate::answer::{Answer, OF_CENTER, OF_LINE, answer, coordinates, copied, doubt};
 use crate::error::FitError;
 use crate::table::Table;
 use crate::{TableRequest, usage};
@@ -208,6 +208,7 @@ fn center(table: &Table, entry: &Entry<dyn calib_plugin::Cor>, fit: &CorFit) -> 
     let mut value = head(entry, fit.weak.as_deref());
     value["center_m"] = json!(fit.center_m);
     value["covariance"] = json!(fit.covariance_m2);
+    value["covariance_of"] = json!(OF_CENTER);
     value["radius_m"] = json!(fit.radii_m);
     value["rms_m"] = json!(fit.rms_m);
     value["used"] = json!(fit.used);
@@ -235,6 +236,7 @@ fn axis(table: &Table, entry: &Entry<dyn calib_plugin::Aor>, fit: &AorFit) -> An
     value["direction"] = json!(fit.line.direction);
     value["point_m"] = json!(fit.line.point_m);
     value["covariance"] = json!(fit.covariance);
+    value["covariance_of"] = json!(OF_LINE);
     value["rms_m"] = json!(fit.rms_m);
     value["used"] = json!(fit.used);
     value["rejected"] = json!(rows(table, &fit.rejected));

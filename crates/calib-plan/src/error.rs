@@ -239,7 +239,8 @@ pub enum PlanError {
     },
     /// The σ that was asked for is not reached.
     #[error(
-        "{file}: σ of {asked} is not reached with {most} postures: {reached}\n  help: ask for more, reduce the tracker's noise, or move markers further apart (`calib plan --poses {most}` shows what remains)"
+        "{file}: σ of {asked} is not reached with {most} postures: {reached}\n  help: {}ask for a larger σ, reduce the tracker's noise, or move markers further apart (`calib plan --poses {most}` shows what remains)",
+        needed.map_or_else(String::new, |n| format!("record about {n} postures (`calib plan --poses {n}`), "))
     )]
     NotReached {
         /// The profile.
@@ -250,6 +251,8 @@ pub enum PlanError {
         most: usize,
         /// What they reach.
         reached: String,
+        /// How many would reach it, where so many can be chosen.
+        needed: Option<usize>,
     },
     /// The motions of the shortest plan take longer than they may.
     #[error(

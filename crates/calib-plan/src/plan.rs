@@ -14,6 +14,10 @@ use crate::words;
 const POSES: usize = 36;
 /// Most postures that are tried for a σ.
 const MOST: usize = 200;
+/// Most postures of which it is said that they would reach a σ, where [`MOST`] do not.
+const MOST_CHOSEN: usize = 1000;
+/// Postures beyond those that the square root asks for.
+const MORE: f64 = 1.2;
 /// Fewest postures of a plan.
 const FEWEST: usize = 6;
 
@@ -85,18 +89,26 @@ fn within(prepared: &Prepared<'_>, whole: &Plan, most: f64) -> Result<Plan, Plan
 /// The plan with the fewest postures that reaches a σ.
 fn for_sigma(prepared: &Prepared<'_>, asked: f64) -> Result<Plan, PlanError> {
     let most = MOST.min(prepared.candidates.len() / 2).max(FEWEST);
-    let not_reached = |reached: Option<f64>| PlanError::NotReached {
-        file: prepared.known.robot.file.clone(),
-        asked: words::length(Some(asked)),
-        most,
-        reached: words::length(reached),
-    };
     // Without an order and postures from both sides, to begin near the number.
     let without_order = |count: usize| {
         let m = choice(prepared, count, Effort::Quick).information;
         sigma(&m, &prepared.b)
     };
     let reaches = |sigma: Option<f64>| sigma.is_some_and(|s| s <= asked);
+    let not_reached = |reached: Option<f64>| {
+        // σ falls with the square root of the number, and more slowly where a prior or the joints' scatter is left.
+        let share = reached.map(|reached| (reached / asked).powi(2));
+        let needed = share.map(|share| (most as f64 * share * MORE).ceil());
+        let needed = needed.filter(|n| *n <= MOST_CHOSEN.min(prepared.candidates.len() / 2) as f64);
+        let needed = needed.map(|n| n as usize);
+        PlanError::NotReached {
+            file: prepared.known.robot.file.clone(),
+            asked: words::length(Some(asked)),
+            most,
+            reached: words::length(reached),
+            needed: needed.filter(|n| reaches(without_order(*n))),
+        }
+    };
     let (mut low, mut high) = (FEWEST - 1, most);
     if !reaches(without_order(most)) {
         return Err(not_reached(without_order(most)));

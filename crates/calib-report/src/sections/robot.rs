@@ -16,6 +16,9 @@ pub(super) fn changes(page: &mut Page, report: &Report) {
     let all = RobotChange::sorted([report.robot_changes.clone(), effects].concat());
     let (measured, open): (Vec<_>, Vec<_>) = all.into_iter().partition(|c| c.measured);
     page.table("", changed(&measured));
+    if let Some(scale) = words::robot::scale(&measured) {
+        page.text(scale);
+    }
     if !open.is_empty() {
         let names: Vec<String> = open.iter().map(|c| c.text.clone()).collect();
         page.text(format!(

@@ -79,6 +79,20 @@ pub(crate) fn changed(report: &Report) -> Vec<String> {
     lines
 }
 
+/// What no σ of a length holds: the instrument's own scale.
+pub(crate) fn scale(changes: &[RobotChange]) -> Option<String> {
+    let lengths = changes
+        .iter()
+        .filter(|c| c.unit == Unit::Meter && c.sigma.is_some());
+    let longest = lengths.map(|c| c.value.abs()).fold(0.0, f64::max);
+    (longest > 0.0).then(|| {
+        format!(
+            "No σ includes the scale of the measuring instrument: where its unit of length is off by 0.01 %, every length is, the longest of these by {}.",
+            number::fixed_with_unit(1e-4 * longest, Unit::Meter, 2)
+        )
+    })
+}
+
 /// How the parameters of the fit are known: "61 parameters: 21 identifiable, 40 arbitrary conventions."
 pub(crate) fn parameters(report: &Report) -> Option<String> {
     let of = |classes: &[Class]| {
