@@ -347,7 +347,29 @@ fn a_sigma_that_is_asked_for_is_reached_by_the_fewest_postures_or_refused() {
     assert!(fewer.sigma.is_none_or(|s| s > 0.12e-3));
     options.sigma = Some(1e-7);
     let refused = plan(&known, &options).expect_err("no plan reaches it");
-    assert!(matches!(refused, PlanError::NotReached { .. }), "{refused}");
+    let needed = |refused: PlanError| match refused {
+        PlanError::NotReached { needed, .. } => needed,
+        other => panic!("{other}"),
+    };
+    assert_eq!(needed(refused), None);
+    // A little more than 200 postures reach: their number is said, and reaches it.
+    let most = Options {
+        candidates: 1200,
+        ..few(200)
+    };
+    let reached = planned(&known, &most).sigma.expect("determined");
+    let asked = Options {
+        sigma: Some(0.93 * reached),
+        poses: None,
+        ..most.clone()
+    };
+    let number = needed(plan(&known, &asked).expect_err("beyond 200"));
+    let more = Options {
+        poses: Some(number.expect("a number")),
+        ..most
+    };
+    let reached = planned(&known, &more).sigma;
+    assert!(reached.is_some_and(|s| s <= asked.sigma.expect("asked")));
 }
 
 #[test]
