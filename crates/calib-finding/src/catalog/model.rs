@@ -168,7 +168,7 @@ super::topic! {
         "corrected_ahead": Warning,
             "The joint values of {recording:code} are {offset} ± {sigma} ahead of the tracker's data of their rows. This was estimated from the motion and corrected.",
             "Correct the times of the joint values if you can. The offset is taken into account.";
-        "offset": Warning,
+        "offset": Info,
             "The tracker's clock is {offset:size} ± {sigma} {offset:ahead-or-behind} the robot's[[ and runs {drift:ppm-size} ± {sigma_drift:ppm} {drift:faster-or-slower}]].",
             "Use a shared clock if you can. The offset is taken into account.";
         "ambiguous": Error,
