@@ -336,3 +336,40 @@ fn streams_of_a_robot_that_turns_nothing_are_brought_together() {
         }
     }
 }
+
+/// Clocks that are stated to be one and are not: times without anything in common, as of two time zones, are refused, and holds of the bodies in which the
+/// joints move are counted.
+#[test]
+fn clocks_that_are_not_shared_are_named_where_they_are_stated_to_be() {
+    let motion = Motion::StopAndGo {
+        hold: 1.2,
+        travel: 1.3,
+    };
+    let dir = two_files(Body::Four, motion, 120.0, "{clock: shared, hold_s: 0.8}", 5);
+    let said = dir.calib(["check", "arm.yaml"]).stdout;
+    assert!(said.contains("The bodies stand still"), "{said}");
+    let mut dir = dir;
+    for file in ["poses_joints.csv", "check_joints.csv"] {
+        let text = dir.read(file);
+        let mut column = 0;
+        let rows = text.lines().map(|row| {
+            let mut cells: Vec<String> = row.split(',').map(str::to_owned).collect();
+            match cells.iter().position(|cell| cell == "t_s") {
+                Some(found) => column = found,
+                None if !row.starts_with('#') => {
+                    let t: f64 = cells[column].parse().expect("a time");
+                    cells[column] = (t + 7200.0).to_string();
+                }
+                None => {}
+            }
+            cells.join(",")
+        });
+        let rows: Vec<String> = rows.collect();
+        dir = dir.file(file, rows.join("\n") + "\n");
+    }
+    for command in ["check", "run"] {
+        let said = dir.calib([command, "arm.yaml"]).expect(3).stderr;
+        assert!(said.contains("have nothing in common"), "{said}");
+        assert!(said.contains("max_offset_s: 7"), "{said}");
+    }
+}

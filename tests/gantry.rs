@@ -301,6 +301,38 @@ fn slides_in_centimeters_are_not_a_tracker_in_another_unit() {
     assert!(verdict.contains("accepted"), "{verdict}");
 }
 
+/// One slide in centimeters under a name that says millimeters, of a robot that turns as well: that is its unit, and no gear.
+#[test]
+fn one_slide_in_centimeters_is_named() {
+    let robot = RobotModel::from_urdf_text(&urdf_of(&LIFT), "lift.urdf").expect("a robot");
+    let centimeters = |table: String| {
+        let (head, rows) = table.split_once('\n').expect("a header");
+        let rows = rows.lines().map(|row| {
+            let (lift, rest) = row.split_once(',').expect("cells");
+            let lift: f64 = lift.parse().expect("a number");
+            format!("{},{rest}\n", 100.0 * lift)
+        });
+        format!(
+            "{}\n{}",
+            head.replace("lift_m", "lift_mm"),
+            rows.collect::<String>()
+        )
+    };
+    let table = |n, seed| centimeters(recording_of(&robot, &LIFT, None, n, seed));
+    let dir = Scratch::new()
+        .file("gantry/gantry.urdf", urdf_of(&LIFT))
+        .file("gantry.yaml", PROFILE)
+        .file("gantry/poses.csv", table(40, 7))
+        .file("gantry/checks.csv", table(12, 8));
+    let said = dir.calib(["check", "gantry.yaml"]).expect(3).stdout;
+    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert!(
+        said.contains("joint `lift` read as cm instead of mm"),
+        "{said}"
+    );
+    assert!(said.contains("column `lift_mm` to `lift_cm`"), "{said}");
+}
+
 /// A share between joints of two kinds has a unit; it is no percentage.
 #[test]
 fn a_large_share_between_unlike_joints_is_said_in_its_unit() {

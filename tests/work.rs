@@ -365,8 +365,14 @@ recordings:
                home,1.5,-20.25,30,40,50\nplace,-10,-30,20,10.5,0\n";
     let foreign =
         "Mode;A1;A2;A3;A4;A5;Gripper\nAUTO;1,5;-20,25;30;40;50;3,5\nAUTO;-10;-30;20;10,5;0;3,5\n";
+    // A joint that the recording holds, and a map that also has what a program has not.
+    let held = profile
+        .replace("file: one.csv\n    use: static\n", "file: one.csv\n    use: static\n    hold: {wrist_roll_deg: 50}\n")
+        .replace(", wrist_roll: A5", "")
+        .replace("angles: deg\n", "angles: deg\n      time: {column: Stamp, unit: ms}\n      markers: {m: [MX, MY, MZ]}\n");
     let dir = Scratch::new()
         .file("r.yaml", profile)
+        .file("held.yaml", held)
         .file(
             "r2.yaml",
             profile.replace("*map", "{angles: rad, joints: {waist: A1}}"),
@@ -404,6 +410,15 @@ recordings:
         let ran = like(file, more);
         assert!(ran.code > 1 && ran.stderr.contains(says), "{}", ran.stderr);
     }
+    let ran = like("held.yaml", &["--recording", "one"]);
+    let first = |text: &str| text.lines().nth(1).map(str::to_owned);
+    assert_eq!(first(&ran.expect(0).stdout), first(&wanted.stdout));
+    let ran = like("held.yaml", &["--recording", "two"]);
+    assert!(
+        ran.stderr.contains("count as 0: wrist_roll"),
+        "{}",
+        ran.stderr
+    );
     let converted = ["convert", "log.csv", "out.csv", "--profile", "r.yaml"];
     dir.calib_with(&converted).expect(0);
     let wanted = wanted.stdout;

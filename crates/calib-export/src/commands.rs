@@ -6,10 +6,10 @@
 use calib_model::{
     Aim, Approach, Correction, Model, ModelError, Options, Outcome, Place, Pose, Scope, Under, Work,
 };
-use calib_recording::ColumnMap;
 use nalgebra::Matrix6;
 
 use crate::starts::{LEVER, Starts};
+use crate::table::WrittenLike;
 
 /// Searches of a row; a joint whose direction still changes then is between its two sides.
 const SEARCHES: usize = 4;
@@ -29,8 +29,8 @@ pub struct CorrectOptions {
     pub largest_rad: Option<f64>,
     /// The same of sliding joints.
     pub largest_m: Option<f64>,
-    /// The map of a table that names its columns its own way.
-    pub columns: Option<ColumnMap>,
+    /// How the table is written.
+    pub like: WrittenLike,
 }
 
 impl CorrectOptions {

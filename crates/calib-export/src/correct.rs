@@ -64,7 +64,7 @@ pub fn correct(
     options: &CorrectOptions,
 ) -> Result<Corrected, ExportError> {
     let model = &robot.model;
-    let program = program(table, robot, options.columns.as_ref())?;
+    let program = program(table, robot, &options.like)?;
     let last = &model.links()[model.last_link().index()];
     let name = options.tool.as_ref().unwrap_or(last);
     let tool = robot.tool(options.tool.as_deref())?;

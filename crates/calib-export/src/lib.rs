@@ -41,5 +41,5 @@ pub use error::ExportError;
 pub use export::{Exported, export};
 pub use predict::{Frame, PredictOptions, Predicted, predict};
 pub use read::{Robot, robot, robot_with};
-pub use table::{Region, region};
+pub use table::{Region, WrittenLike, region};
 pub use target::Target;

@@ -5,12 +5,11 @@ use std::path::Path;
 
 use calib_finding::cell;
 use calib_model::{Approach, ModelError, Place, Scope, Under};
-use calib_recording::ColumnMap;
 use nalgebra::{Matrix3, Matrix6};
 
 use crate::error::ExportError;
 use crate::read::Robot;
-use crate::table::{Csv, Program, program};
+use crate::table::{Csv, Program, WrittenLike, program};
 
 /// The frame that poses are given in.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
@@ -33,8 +32,8 @@ pub struct PredictOptions {
     pub unordered: bool,
     /// The torques of the table load the joints, in place of gravity.
     pub torques: bool,
-    /// The map of a table that names its columns its own way.
-    pub columns: Option<ColumnMap>,
+    /// How the table is written.
+    pub like: WrittenLike,
 }
 
 /// Predicted poses.
@@ -65,7 +64,7 @@ pub fn predict(
     table: &Path,
     options: &PredictOptions,
 ) -> Result<Predicted, ExportError> {
-    let program = program(table, robot, options.columns.as_ref())?;
+    let program = program(table, robot, &options.like)?;
     if options.torques && program.held.is_empty() {
         return Err(ExportError::Column {
             file: program.file,

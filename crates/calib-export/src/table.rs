@@ -5,7 +5,7 @@ use std::path::Path;
 
 use calib_model::{Model, Place, Pose};
 use calib_recording::{
-    ColumnMap, Filled, JointUnit, Poses, Problem, ReadOptions, WHOLE_ROBOT, read_path,
+    ColumnMap, Filled, JointUnit, Poses, Problem, ReadOptions, Recording, WHOLE_ROBOT, read_path,
 };
 use nalgebra::Point3;
 
@@ -59,11 +59,40 @@ impl Program {
     }
 }
 
-/// Reads a table of joint positions in any format that `calib` reads; `columns`: the map of one that names them its own way.
+/// How a table is written that follows a recording of a profile.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct WrittenLike {
+    /// Column maps: the first by which it can be read.
+    pub columns: Vec<ColumnMap>,
+    /// Joints that it does not list and that stand still, rad or m.
+    pub held: BTreeMap<String, f64>,
+}
+
+impl WrittenLike {
+    /// Each map, and each with its joints alone: a program has neither markers nor times. None where the columns have our own names.
+    fn maps(&self) -> Vec<Option<ColumnMap>> {
+        let joints_alone = |map: &ColumnMap| ColumnMap {
+            time: None,
+            markers: BTreeMap::new(),
+            bodies: BTreeMap::new(),
+            long: None,
+            labels: Vec::new(),
+            ..map.clone()
+        };
+        let whole = self.columns.iter().cloned();
+        let maps: Vec<_> = whole
+            .chain(self.columns.iter().map(joints_alone))
+            .map(Some)
+            .collect();
+        if maps.is_empty() { vec![None] } else { maps }
+    }
+}
+
+/// Reads a table of joint positions in any format that `calib` reads.
 pub(crate) fn program(
     path: &Path,
     robot: &Robot,
-    columns: Option<&ColumnMap>,
+    like: &WrittenLike,
 ) -> Result<Program, ExportError> {
     let file = path.display().to_string();
     let model = &robot.model;
@@ -72,10 +101,9 @@ pub(crate) fn program(
         joints: model.joints().iter().map(|j| j.name.clone()).collect(),
         of_robot: true,
         remarks: true,
-        columns: columns.cloned(),
         ..ReadOptions::default()
     };
-    let recording = read_path(path, &options).or_else(|error| match *error.problem {
+    let recording = read_by_one(path, &options, like).or_else(|error| match *error.problem {
         // What `calib correct` wrote has its notes beside the joints.
         Problem::UnknownColumn { ref name, .. } if name == LINE => {
             let notes = NOTES.iter().map(|note| (*note).to_owned());
@@ -105,7 +133,7 @@ pub(crate) fn program(
         all.any(|j| j.name == *name && j.mimic.is_some())
     };
     let own = |name: &String| model.joints().iter().any(|j| j.name == *name);
-    let is_used = |name: &String| own(name) || columns.is_none() && !follows(name);
+    let is_used = |name: &String| own(name) || like.columns.is_empty() && !follows(name);
     poses.joints.retain(|name, _| is_used(name));
     poses.joint_units.retain(|name, _| is_used(name));
     fits(&file, &poses, model)?;
@@ -113,7 +141,10 @@ pub(crate) fn program(
     let row = |k: usize| -> Option<Vec<f64>> {
         let joints = model.joints().iter();
         joints
-            .map(|j| column(&j.name).map_or(Some(0.0), |c| c[k]))
+            .map(|j| match column(&j.name) {
+                Some(column) => column[k],
+                None => Some(like.held.get(&j.name).copied().unwrap_or(0.0)),
+            })
             .collect()
     };
     let torques = |k: usize| -> Option<Vec<f64>> {
@@ -123,7 +154,8 @@ pub(crate) fn program(
             .collect()
     };
     let with_torques = !poses.torques.is_empty();
-    let absent = model.joints().iter().filter(|j| column(&j.name).is_none());
+    let is_absent = |name: &str| column(name).is_none() && !like.held.contains_key(name);
+    let absent = model.joints().iter().filter(|j| is_absent(&j.name));
     Ok(Program {
         q: (0..n).map(row).collect(),
         held: if with_torques {
@@ -145,6 +177,26 @@ pub(crate) fn program(
         lines: poses.rows,
         file,
     })
+}
+
+/// The table by the first map by which it can be read; else why not by the first one.
+fn read_by_one(
+    path: &Path,
+    options: &ReadOptions,
+    like: &WrittenLike,
+) -> Result<Recording, calib_recording::Error> {
+    let mut first = None;
+    for columns in like.maps() {
+        let options = ReadOptions {
+            columns,
+            ..options.clone()
+        };
+        match read_path(path, &options) {
+            Ok(recording) => return Ok(recording),
+            Err(error) => first = first.or(Some(error)),
+        }
+    }
+    first.map_or_else(|| read_path(path, options), Err)
 }
 
 /// By row and joint, °C; a cell that is empty has that of the last one before it, or of the first.
@@ -181,12 +233,8 @@ pub struct Region {
 ///
 /// # Errors
 /// [`ExportError`].
-pub fn region(
-    path: &Path,
-    robot: &Robot,
-    columns: Option<&ColumnMap>,
-) -> Result<Region, ExportError> {
-    let program = program(path, robot, columns)?;
+pub fn region(path: &Path, robot: &Robot, like: &WrittenLike) -> Result<Region, ExportError> {
+    let program = program(path, robot, like)?;
     Ok(Region {
         postures: program.q.into_iter().flatten().collect(),
         absent: program.absent,

@@ -5,13 +5,12 @@ use std::collections::BTreeSet;
 use super::chain::Motion;
 use super::correct::{same_shape, stuck_at};
 use super::data::{Body, Data, Measured};
-use super::hypothesis::{
-    Direction, Hypothesis, PoseMistake, QuarterTurns, Scope, TRACKER_UNITS, UnitMistake,
-};
+use super::hypothesis::{Direction, Hypothesis, PoseMistake, QuarterTurns, Scope};
 use super::ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex};
 use super::order::ColumnOrder;
 use super::scan::Scan;
 use super::thinning::thinned;
+use super::units::{TRACKER_UNITS, UnitMistake};
 
 /// A column whose values differ by less (rad or m) carries no information about its own sign or unit.
 const MOVES: f64 = 1e-6;
@@ -80,19 +79,19 @@ fn of_readings(data: &Data, scopes: &[Scope], list: &mut Vec<Candidate>) {
     let joints = data.relevant_joints();
     let empty = data.assumed_zero();
     let mut add = |h: Hypothesis| list.push((h, scopes.to_vec()));
+    let lengths = || {
+        let all = TRACKER_UNITS.into_iter();
+        all.map(|(unit, read_as)| UnitMistake::Length { unit, read_as })
+    };
     for &joint in &joints {
         let Some(revolute) = data.chain.turns(joint.0) else {
             continue;
         };
         if span(data, joint) > MOVES {
             add(Hypothesis::Sign { joint });
-            let units = if revolute {
-                [DegreesReadAsRadians, RadiansReadAsDegrees]
-            } else {
-                [
-                    UnitMistake::MILLIMETERS_READ_AS_METERS,
-                    UnitMistake::METERS_READ_AS_MILLIMETERS,
-                ]
+            let units = match revolute {
+                true => vec![DegreesReadAsRadians, RadiansReadAsDegrees],
+                false => lengths().collect(),
             };
             // A unit that leaves a joint hardly any motion says that it stood still: that is another mistake.
             let least = if revolute { LEAST_TURN } else { LEAST_WAY };
@@ -142,11 +141,10 @@ fn of_readings(data: &Data, scopes: &[Scope], list: &mut Vec<Candidate>) {
         let moves = |j: &&JointIndex| span(data, **j) > MOVES;
         joints.iter().filter(of_kind).filter(moves).count()
     };
-    // All lengths of a robot in one unit, and all of the tracker in one: of a robot that only slides, its own are as good a guess.
-    let lengths = TRACKER_UNITS.map(|(unit, read_as)| UnitMistake::Length { unit, read_as });
+    // Of a robot that only slides, another unit of its joints is as good a guess as another one of the tracker.
     for mistake in [DegreesReadAsRadians, RadiansReadAsDegrees]
         .into_iter()
-        .chain(lengths)
+        .chain(lengths())
     {
         if moving(mistake.of_angles()) > 1 {
             add(Hypothesis::Units { mistake });

@@ -89,6 +89,7 @@ mod swept;
 mod tested;
 mod thinning;
 mod twin;
+mod units;
 mod whitened;
 
 pub use apply::{apply, apply_all};
@@ -96,10 +97,7 @@ pub use chain::{Chain, ChainError, ChainJoint, Motion};
 pub use continuous::Continuous;
 pub use data::{Body, Data, DataError, Measured};
 pub use decide::{explain, registration_residual};
-pub use hypothesis::{
-    Direction, Hypothesis, Length, PoseMistake, QuarterTurns, Scope, Scoped, TRACKER_UNITS,
-    UnitMistake,
-};
+pub use hypothesis::{Direction, Hypothesis, PoseMistake, QuarterTurns, Scope, Scoped};
 pub use ids::{BodyIndex, JointIndex, LinkIndex, RecordingIndex, SampleIndex};
 pub use jump::{Jump, Moved, Size};
 pub use likelihood::{KnownNoise, log_odds};
@@ -113,3 +111,4 @@ pub use rotation::axes_rotation;
 pub use rounding::{Rounding, by_rounding_alone, rounding};
 pub use rows::{Deviation, Deviations, deviations};
 pub use thinning::thin;
+pub use units::{Length, TRACKER_UNITS, UnitMistake};

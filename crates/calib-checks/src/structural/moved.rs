@@ -229,8 +229,9 @@ mod tests {
     use super::super::chain::{Chain, ChainJoint, Motion};
     use super::super::correct::correct;
     use super::super::data::{Body, Data, Measured};
-    use super::super::hypothesis::{QuarterTurns, Scoped, UnitMistake};
+    use super::super::hypothesis::{QuarterTurns, Scoped};
     use super::super::ids::RecordingIndex;
+    use super::super::units::UnitMistake;
     use super::*;
 
     /// A number in [−1, 1] that looks random.

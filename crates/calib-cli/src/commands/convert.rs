@@ -9,7 +9,8 @@ use calib_pipeline::error::PipelineError;
 use calib_pipeline::prepare::{estimators::Estimators, readers};
 use calib_plugin::{Origin, typed};
 use calib_recording::{
-    ReadOptions, Recording, WriteOptions, read_path_with, renamed_comment, write_recording,
+    ColumnMap, ReadOptions, Recording, WriteOptions, read_path_with, renamed_comment,
+    write_recording,
 };
 use clap::Args;
 
@@ -94,6 +95,30 @@ fn read_by_plugin(
     Ok(Some(readers::read(entry, &parameters, &shown, &bytes)?))
 }
 
+/// The recording by the first map by which it can be read; else why not by the first one.
+fn read_by_one(
+    input: &Path,
+    options: &ReadOptions,
+    maps: &[ColumnMap],
+    progress: &mut dyn FnMut(u64, u64),
+) -> Result<Recording, CliError> {
+    let mut first = None;
+    for map in maps {
+        let options = ReadOptions {
+            columns: Some(map.clone()),
+            ..options.clone()
+        };
+        match read_path_with(input, &options, progress) {
+            Ok(recording) => return Ok(recording),
+            Err(error) => first = first.or(Some(error)),
+        }
+    }
+    match first {
+        Some(error) => Err(error.into()),
+        None => Ok(read_path_with(input, options, progress)?),
+    }
+}
+
 /// Reads a recording of any known format and renders it as canonical CSV; `progress(bytes read, bytes in all)` is told
 /// how far the reading is.
 fn convert(options: &Convert, progress: &mut dyn FnMut(u64, u64)) -> Result<Converted, CliError> {
@@ -106,6 +131,7 @@ fn convert(options: &Convert, progress: &mut dyn FnMut(u64, u64)) -> Result<Conv
         plugins,
     } = options;
     let names = names_of(map)?;
+    let written = like.written(input, false)?;
     let by_plugin = match plugins.plugin.is_empty() {
         true => None,
         false => read_by_plugin(input, format.as_deref(), plugins)?,
@@ -115,15 +141,21 @@ fn convert(options: &Convert, progress: &mut dyn FnMut(u64, u64)) -> Result<Conv
         None => {
             let options = ReadOptions {
                 format: format.clone(),
-                columns: like.map(input, false)?,
                 ..ReadOptions::default()
             };
-            read_path_with(input, &options, progress)?
+            read_by_one(input, &options, &written.columns, progress)?
         }
     };
     recording.rename_all(&names)?;
     let mut notes = vec![format!("read as {}", recording.meta.format)];
     notes.extend(recording.meta.conversions.iter().cloned());
+    if !written.held.is_empty() {
+        let held: Vec<&str> = written.held.keys().map(String::as_str).collect();
+        notes.push(format!(
+            "not in the table: {}, which the profile holds (`hold`)",
+            held.join(", ")
+        ));
+    }
     notes.extend(
         recording
             .meta

@@ -60,7 +60,7 @@ pub fn run(console: &Console, options: &Correct) -> Result<ExitCode, CliError> {
         position_only: options.position_only,
         largest_rad: options.largest_deg.map(f64::to_radians),
         largest_m: options.largest_mm.map(|mm| 1e-3 * mm),
-        columns: options.like.map(&options.program, true)?,
+        like: options.like.written(&options.program, true)?,
     };
     let done = correct(robot, &options.program, &with)?;
     with_plugins.evaluated()?;

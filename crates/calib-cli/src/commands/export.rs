@@ -47,8 +47,8 @@ pub fn run(console: &Console, options: &Export) -> Result<ExitCode, CliError> {
     let robot = robot(&options.model)?;
     let region = match &options.region {
         Some(table) => {
-            let columns = options.like.map(table, true)?;
-            Some(region(table, &robot, columns.as_ref())?)
+            let like = options.like.written(table, true)?;
+            Some(region(table, &robot, &like)?)
         }
         None => None,
     };

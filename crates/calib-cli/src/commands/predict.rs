@@ -67,7 +67,7 @@ pub fn run(console: &Console, options: &Predict) -> Result<ExitCode, CliError> {
         },
         unordered: options.unordered,
         torques: options.torques,
-        columns: options.like.map(&options.table, true)?,
+        like: options.like.written(&options.table, true)?,
     };
     let done = predict(&robot.robot, &options.table, &with)?;
     robot.evaluated()?;

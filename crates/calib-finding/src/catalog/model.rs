@@ -189,6 +189,12 @@ super::topic! {
         "apart": Error,
             "The times of tracker and robot have too little in common: offsets of up to {searched:s} are looked for, and the recordings overlap at offsets from {least:s} to {most:s}.",
             "If they were recorded together, set `timing: {max_offset_s: {needed}}` for the recording: the offset is then looked for up to there.";
+        "disjoint": Error,
+            "The tracker's times and those of the joints have nothing in common: the tracker's begin {gap:s-size} {gap:ahead-or-behind} the robot's, and each lasts at most {lasts:s}. They are taken for times of one clock.",
+            "If one clock wrote both, correct the times of one file (whole hours are a time zone). Otherwise remove `clock: shared` from `timing`, and set `max_offset_s: {needed}`: the offset is then estimated from the motion.";
+        "holds_apart": Warning,
+            "The bodies stand still {bodies} times, but the joints with them only {both} times: the others are no poses.",
+            "Check that the times of both files are of one clock, and that the robot's log is of the whole recording. If there are two clocks, remove `clock: shared` from `timing`: the offset is then estimated from the motion.";
     }
     /// Quaternions in another order.
     QUATERNION_ORDER = "quaternion-order" {

@@ -17,7 +17,7 @@ use std::sync::Arc;
 use calib_checks::model::alignment;
 use calib_checks::sync::OffsetOutcome;
 use calib_checks::{Expectations, checks};
-use calib_finding::{Finding, Severity, Subject, catalog};
+use calib_finding::{About, Fact, Finding, Severity, Subject, catalog};
 use calib_profile::{Clocks, RecordingSpec, TimedPoses, Timing};
 use calib_recording::{Poses, Recording};
 
@@ -147,6 +147,7 @@ fn aligned(
         full = seen.into_owned();
         findings.extend(reflections.into_iter().map(|f| f.in_recording(name)));
     }
+    streams.meet(name, &clocks)?;
     let velocities = streams.add_robot(&mut full, &clocks);
     keep_jumps_beside_joints(&full, &mut findings);
     let mut aligned = Aligned {
@@ -275,6 +276,33 @@ impl<'a> Streams<'a> {
         } else {
             None
         }
+    }
+
+    /// That times which were stated to be of one clock have something in common.
+    fn meet(&self, name: &str, clocks: &ClockState) -> Result<(), DataProblem> {
+        match self.disjoint(clocks) {
+            Some(why) => Err(DataProblem::Clocks {
+                recording: name.to_owned(),
+                why: Box::new(why.in_recording(name)),
+            }),
+            None => Ok(()),
+        }
+    }
+
+    fn disjoint(&self, clocks: &ClockState) -> Option<Finding> {
+        let longest = self.joints.values().max_by_key(|j| j.t.len())?;
+        let ends = |t: &[f64]| Some((*t.first()?, *t.last()?));
+        let ((from, to), (first, last)) = (ends(&self.times)?, ends(&longest.t)?);
+        let stated = matches!(clocks, ClockState::Declared | ClockState::One);
+        (stated && (to < first || last < from)).then(|| {
+            Finding::of_kind(catalog::CLOCK_LAG, "disjoint", About::Clocks)
+                .with("gap", Fact::seconds(from - first))
+                .with("lasts", Fact::seconds((to - from).max(last - first)))
+                .with(
+                    "needed",
+                    Fact::count(((from - first).abs() + (to - from)).ceil() as usize),
+                )
+        })
     }
 
     /// Adds joint positions, torques and temperatures at the tracker's times to its table; gives the joints' speeds.

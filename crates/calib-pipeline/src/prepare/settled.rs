@@ -3,13 +3,13 @@
 use std::collections::BTreeMap;
 
 use calib_checks::sync::{HoldSettings, holds, static_poses};
-use calib_finding::{Fact, Finding, Subject, catalog};
+use calib_finding::{About, Fact, Finding, Subject, catalog};
 use calib_profile::{Timing, Tracker};
 use calib_recording::Poses;
 use calib_report::RejectedFor;
 use nalgebra::Matrix3;
 
-use crate::prepare::aligned::Aligned;
+use crate::prepare::aligned::{Aligned, ClockState};
 use crate::prepare::excluded::Excluded;
 use crate::prepare::row_noise::RowNoise;
 
@@ -38,17 +38,14 @@ pub(crate) fn settle(
     full: &Poses,
     aligned: &mut Aligned,
 ) {
-    let usual = HoldSettings::default();
-    // Within a window of some twenty samples noise spreads over less than twelve σ.
-    let spread = |sigma: Option<f64>| sigma.map_or(0.0, |s| 12.0 * s);
-    let position = spread(tracker.marker_coordinate()).max(spread(tracker.body_coordinate()));
-    let settings = HoldSettings {
-        min_duration: timing.hold,
-        point_range: usual.point_range.max(position),
-        turn_range: usual.turn_range.max(spread(tracker.body_sigma_rad)),
-        ..usual
-    };
+    let settings = hold_settings(timing, tracker);
     let found = holds(full, &settings);
+    aligned.findings.extend(holds_apart(
+        name,
+        full,
+        (&settings, found.len()),
+        &aligned.alignment.clocks,
+    ));
     let table = static_poses(full, &found);
     aligned.alignment.holds = Some(found.len());
     // Holds whose halves differ, and holds that scatter more than the others.
@@ -128,6 +125,46 @@ pub(crate) fn settle(
         }
     }
     aligned.poses = table.poses;
+}
+
+/// What counts as a hold at this noise of the tracker.
+fn hold_settings(timing: &Timing, tracker: &Tracker) -> HoldSettings {
+    let usual = HoldSettings::default();
+    // Within a window of some twenty samples noise spreads over less than twelve σ.
+    let spread = |sigma: Option<f64>| sigma.map_or(0.0, |s| 12.0 * s);
+    let position = spread(tracker.marker_coordinate()).max(spread(tracker.body_coordinate()));
+    HoldSettings {
+        min_duration: timing.hold,
+        point_range: usual.point_range.max(position),
+        turn_range: usual.turn_range.max(spread(tracker.body_sigma_rad)),
+        ..usual
+    }
+}
+
+/// Holds of the bodies in this ratio to those of bodies and joints, and so many more, are no accident.
+const APART: (f64, usize) = (1.5, 5);
+
+/// Holds of the bodies in which the joints move, or have no values, by two clocks that were stated to be one.
+fn holds_apart(
+    name: &str,
+    full: &Poses,
+    (settings, both): (&HoldSettings, usize),
+    clocks: &ClockState,
+) -> Option<Finding> {
+    if full.joints.is_empty() || !matches!(clocks, ClockState::Declared) {
+        return None;
+    }
+    let alone = Poses {
+        joints: BTreeMap::new(),
+        ..full.clone()
+    };
+    let bodies = holds(&alone, settings).len();
+    (bodies as f64 >= APART.0 * both as f64 && bodies >= both + APART.1).then(|| {
+        Finding::of_kind(catalog::CLOCK_LAG, "holds_apart", About::Clocks)
+            .in_recording(name)
+            .with("bodies", Fact::count(bodies))
+            .with("both", Fact::count(both))
+    })
 }
 
 /// Adds the usual scatter of one stream and the holds that exceed it. Positions that were rounded to a step scatter by up to half of it along

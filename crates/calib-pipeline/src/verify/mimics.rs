@@ -6,7 +6,7 @@
 
 use std::collections::BTreeMap;
 
-use calib_core::{EffectKind, ParameterEstimate, ParameterKind, Settings};
+use calib_core::{EffectKind, ParameterEstimate, ParameterKind, Physics, ScoreTest, Settings};
 use calib_finding::{Fact, Finding, Severity, Subject, Unit, catalog};
 use calib_report::RobotChange;
 use calib_urdf::{JointId, RobotModel};
@@ -39,8 +39,14 @@ pub struct Ratios {
     pub sigmas: BTreeMap<String, f64>,
 }
 
-/// Fits the ratios that the fit held.
-pub(super) fn ratios(inputs: &Inputs, checked: &Checked, fit: &MlFit) -> Ratios {
+/// Fits the ratios that the fit held. `missing`: effects of joints that the model lacks; where a compliance explains the errors nearly as
+/// well, a ratio is no cause that is named before it.
+pub(super) fn ratios(
+    inputs: &Inputs,
+    checked: &Checked,
+    fit: &MlFit,
+    missing: &[ScoreTest],
+) -> Ratios {
     let followers = followers(inputs, fit);
     if followers.is_empty() {
         return Ratios::default();
@@ -51,10 +57,14 @@ pub(super) fn ratios(inputs: &Inputs, checked: &Checked, fit: &MlFit) -> Ratios 
     };
     let after = changes(&wide, &freed);
     let model = &inputs.robot.model;
-    let clear = clear(followers.len());
+    // Gain, coupling and eccentricity of a joint that follows are what a wrong ratio looks like.
+    let yields = |test: &&ScoreTest| matches!(test.physics, Physics::Effect(kind) if kind.term().class == "torque_compliance");
+    let of_effects = missing.iter().filter(yields).map(|test| test.z2);
+    let of_effects = of_effects.fold(0.0, f64::max);
+    let clear = clear(followers.len()).max((BEYOND_EFFECTS * of_effects).sqrt());
     let of_joint = |joint: &JointId| {
         let found = of_follower(model, *joint, (&freed, clear), (&before, &after));
-        found.or_else(|| alone(inputs, *joint, &freed))
+        found.or_else(|| alone(inputs, *joint, (&freed, clear)))
     };
     let wider = before.iter().filter_map(|b| {
         let sigma = after.iter().find(|a| a.name == b.name)?.sigma?;
@@ -65,6 +75,9 @@ pub(super) fn ratios(inputs: &Inputs, checked: &Checked, fit: &MlFit) -> Ratios 
         sigmas: wider.collect(),
     }
 }
+
+/// A ratio is named beside missing effects where its z² is that of any of them this many times.
+const BEYOND_EFFECTS: f64 = 2.0;
 
 /// How many standard deviations from the stated one make a ratio another, where so many are asked.
 fn clear(ratios: usize) -> f64 {
@@ -139,7 +152,7 @@ fn with_ratios(
 }
 
 /// A joint whose ratio is another one, where no other number depends on it: what slides is as far off as its ratio says.
-fn alone(inputs: &Inputs, joint: JointId, freed: &MlFit) -> Option<Finding> {
+fn alone(inputs: &Inputs, joint: JointId, (freed, clear): (&MlFit, f64)) -> Option<Finding> {
     let model = &inputs.robot.model;
     let joint = model.joint(joint);
     let mimic = joint.mimic?;
@@ -151,7 +164,7 @@ fn alone(inputs: &Inputs, joint: JointId, freed: &MlFit) -> Option<Finding> {
         false => (MATTERS.0, Unit::Meter),
     };
     let size = (gain.value * joint.law.multiplier * (high - low)).abs();
-    if !(gain.value.abs() > REFUTED * sigma && size > least) {
+    if !(gain.value.abs() > REFUTED.max(clear) * sigma && size > least) {
         return None;
     }
     Some(

@@ -137,7 +137,9 @@ pub fn verified(
     if let Some(changed) = verified.causes.change.clone() {
         verified.findings = one_cause(changed, verified.findings);
     }
-    let of_ratios = fit.map(|fit| mimics::ratios(inputs, checked, fit));
+    let missing = verified.causes.goodness.as_ref();
+    let missing = missing.map_or(&[][..], |goodness| &goodness.missing);
+    let of_ratios = fit.map(|fit| mimics::ratios(inputs, checked, fit, missing));
     let of_ratios = of_ratios.unwrap_or_default();
     verified.findings.extend(of_ratios.findings);
     verified.sigmas = of_ratios.sigmas;

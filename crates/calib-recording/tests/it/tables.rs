@@ -642,3 +642,38 @@ fn columns_of_the_robot_s_joints_are_no_markers() {
     let long = "x_mm,y_mm,z_mm,marker,t_s";
     assert!(read(long, &gantry, false).0.is_empty());
 }
+
+/// Where commas are decimal signs, a point before three digits separates thousands: `2.428` is no 2.4, and no number is made of it.
+#[test]
+fn points_between_thousands_are_no_decimal_points_beside_decimal_commas() {
+    let map = ColumnMap {
+        decimal_comma: true,
+        ..ColumnMap::default()
+    };
+    let read = |cell: &str, map: Option<&ColumnMap>| {
+        let text = format!("t_s;q1_deg;tip.x_mm;tip.y_mm;tip.z_mm\n0.125;1;{cell};-398;3\n");
+        let options = ReadOptions {
+            columns: map.cloned(),
+            ..ReadOptions::default()
+        };
+        read_bytes("table.csv", text.as_bytes(), &options)
+    };
+    for cell in ["2.428", "-12.345", "1.234.567", "2.427,541", "2'427,541"] {
+        let refused = read(cell, Some(&map)).expect_err(cell).to_string();
+        assert!(
+            refused.contains("no separators of thousands"),
+            "{cell}: {refused}"
+        );
+    }
+    for (cell, value) in [
+        ("2,428", 2.428e-3),
+        ("0.428", 0.428e-3),
+        ("24.5", 0.0245),
+        ("2428", 2.428),
+    ] {
+        let recording = read(cell, Some(&map)).expect(cell);
+        let point = recording.markers[0].samples[0].point(Filled::Include);
+        assert!((point.expect("measured").x - value).abs() < 1e-12, "{cell}");
+    }
+    assert!(read("2.428", None).is_ok());
+}

@@ -254,18 +254,13 @@ fn of_hypothesis(layout: &Layout<'_>, outcome: &Outcome, scoped: &Scoped) -> Fin
             let subject = Subject::joint(layout.joint(joint));
             let finding = Finding::of_kind(catalog::UNIT_MISMATCH, of_one_joint(mistake), subject)
                 .with("joint", Fact::name(layout.joint(joint)));
+            let finding = with_units(finding, mistake);
             columns::with_remedy(layout, finding, Some(joint), mistake, scoped.scope)
         }
         Hypothesis::Units { mistake } => {
             let kind = of_all_joints(mistake);
             let finding = Finding::of_kind(catalog::UNIT_MISMATCH, kind, Subject::default());
-            let finding = match mistake {
-                UnitMistake::Length { unit, read_as } if kind == "all_lengths" => finding
-                    .with("unit", Fact::name(codes::length(unit)))
-                    .with("read_as", Fact::name(codes::length(read_as)))
-                    .with("factor", Fact::ratio(mistake.factor())),
-                _ => finding,
-            };
+            let finding = with_units(finding, mistake);
             columns::with_remedy(layout, finding, None, mistake, scoped.scope)
         }
         _ => of_tracker(layout, scoped),
@@ -360,12 +355,28 @@ fn reversed_axis(layout: &Layout<'_>, joint: JointIndex) -> Option<Fact> {
     Some(Fact::name(codes::axis(&-axis.into_inner())))
 }
 
+/// Which units of length, where the kind of the finding does not say it.
+fn with_units(finding: Finding, mistake: UnitMistake) -> Finding {
+    let named = [
+        UnitMistake::MILLIMETERS_READ_AS_METERS,
+        UnitMistake::METERS_READ_AS_MILLIMETERS,
+    ];
+    match mistake {
+        UnitMistake::Length { unit, read_as } if !named.contains(&mistake) => finding
+            .with("unit", Fact::name(codes::length(unit)))
+            .with("read_as", Fact::name(codes::length(read_as)))
+            .with("factor", Fact::ratio(mistake.factor())),
+        _ => finding,
+    }
+}
+
 fn of_one_joint(mistake: UnitMistake) -> &'static str {
     match mistake {
         UnitMistake::DegreesReadAsRadians => "joint_degrees",
         UnitMistake::RadiansReadAsDegrees => "joint_radians",
-        UnitMistake::Length { .. } if mistake.factor() < 1.0 => "joint_millimeters",
-        UnitMistake::Length { .. } => "joint_meters",
+        UnitMistake::MILLIMETERS_READ_AS_METERS => "joint_millimeters",
+        UnitMistake::METERS_READ_AS_MILLIMETERS => "joint_meters",
+        UnitMistake::Length { .. } => "joint_lengths",
     }
 }
 

@@ -24,10 +24,7 @@ impl Rows<'_> {
             {
                 return Ok(f64::NAN);
             }
-            Number::Text
-                if self.map.is_some_and(|map| map.decimal_comma)
-                    && cell.matches(',').count() == 1 =>
-            {
+            Number::Text if self.commas && cell.matches(',').count() == 1 => {
                 match number(&cell.replace(',', ".")) {
                     Number::Value(value) => return Ok(value),
                     kind => kind,
@@ -46,12 +43,28 @@ impl Rows<'_> {
             rows.push(line);
             return Ok(f64::NAN);
         }
-        let expected = if cell.contains(',') {
+        let expected = if self.commas && cell.contains(['.', '\'', ',']) {
+            "a number with a decimal comma and no separators of thousands, as the column map states `decimal_comma: true`"
+        } else if cell.contains(',') {
             "a number with a decimal point (a column map can say `decimal_comma: true`)"
         } else {
             "a number, or nothing where the sample was lost (a column map can name a text for that: `columns: {lost: [TEXT]}`)"
         };
         Err((self.at(line, column), not_a_number(cell, kind, expected)))
+    }
+
+    /// Whether a number is one with points between thousands, where commas are the decimal signs: `2.428`, and in any case `1.234.567`.
+    pub(super) fn has_thousands(&self, slot: usize, cell: &str) -> bool {
+        let kind = self.layout.slots[slot].kind;
+        if !self.commas || matches!(kind, SlotKind::Time | SlotKind::Counter) {
+            return false;
+        }
+        let mut groups = cell.trim_start_matches(['-', '+']).split('.');
+        let digits = |group: &str| group.bytes().all(|b| b.is_ascii_digit());
+        let first = groups.next().unwrap_or("");
+        let begins = (1..=3).contains(&first.len()) && digits(first) && !first.starts_with('0');
+        let rest: Vec<&str> = groups.collect();
+        begins && !rest.is_empty() && rest.iter().all(|group| group.len() == 3 && digits(group))
     }
 
     /// A date with a time of day, in the unit of the column.

@@ -27,6 +27,8 @@ pub(super) struct Rows<'a> {
     layout: Layout,
     separator: Separator,
     map: Option<&'a ColumnMap>,
+    /// Numbers have decimal commas.
+    commas: bool,
     /// Numbers of the current row; NaN = empty. Never leaves this module.
     values: Vec<f64>,
     states: Vec<State>,
@@ -100,6 +102,7 @@ impl<'a> Rows<'a> {
             layout,
             separator,
             map,
+            commas: map.is_some_and(|map| map.decimal_comma),
         }
     }
 
@@ -136,6 +139,7 @@ impl<'a> Rows<'a> {
         loop {
             let i = found;
             if let Some(&Column::Number { slot, scale }) = self.layout.columns.get(i)
+                && !self.commas
                 && let Some(value) = row.decimal()
             {
                 self.values[slot] = if scale == 1.0 { value } else { value / scale };
@@ -155,6 +159,9 @@ impl<'a> Rows<'a> {
                 Column::Ignore => {}
                 Column::Number { slot, scale } => {
                     self.values[slot] = match number(cell) {
+                        Number::Value(_) if self.has_thousands(slot, cell) => {
+                            self.unusual(line, i, slot, cell, Number::Text)? / scale
+                        }
                         Number::Value(value) => value / scale,
                         Number::Empty => f64::NAN,
                         kind => self.unusual(line, i, slot, cell, kind)? / scale,
