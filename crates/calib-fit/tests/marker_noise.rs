@@ -129,16 +129,25 @@ fn a_joint_without_a_center_is_said_to_be_one() {
     };
     let answer = cor(&all).expect("a comparison");
     assert!(
-        !answer.observable && !answer.text.contains("agrees"),
+        !answer.observable && !answer.text.contains("DIFFERS"),
         "{}",
         answer.text
     );
-    // Every line states the unit of its coordinates.
-    let lines = answer.text.lines().filter(|line| line.contains('['));
+    // The heads state the units, and the lines fit a terminal of 80 columns.
+    let head = answer.text.lines().next().expect("heads");
+    assert!(
+        ["place, m", "σ, mm", "off, mm"]
+            .iter()
+            .all(|unit| head.contains(unit)),
+        "{head}"
+    );
+    let mut lines = answer.text.lines().filter(|line| line.contains('['));
     assert!(lines.clone().count() > 0, "{}", answer.text);
-    for line in lines {
-        assert!(line.contains("] m  sigma"), "{line}");
-    }
+    assert!(
+        lines.all(|line| line.chars().count() <= 80),
+        "{}",
+        answer.text
+    );
     // A noise that is stated may be one that all markers share.
     let stated = TableRequest {
         sigma_m: Some(2e-3),

@@ -35,6 +35,19 @@ fn count(counts: &mut Counts, data: &Data, truth: Hypothesis, about: &str) {
                 factor: f,
             },
         ) => *joint == of && (factor / f - 1.0).abs() < NEAR,
+        // A slide that moves ten times as far is one in centimeters.
+        (
+            [
+                Scoped {
+                    hypothesis: Hypothesis::Unit { joint, mistake },
+                    scope: Scope::All,
+                },
+            ],
+            Hypothesis::Gain {
+                joint: of,
+                factor: f,
+            },
+        ) => *joint == of && (mistake.factor() / f - 1.0).abs() < NEAR,
         (
             [
                 Scoped {
