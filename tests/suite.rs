@@ -15,6 +15,7 @@ mod contacts;
 mod data_faults;
 mod default_run;
 mod designs;
+mod displaced;
 mod drift;
 mod effects;
 mod exchanged;

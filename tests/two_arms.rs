@@ -20,12 +20,21 @@ const ARM: [(&str, [f64; 3]); 6] = [
 ];
 
 /// The robot with every origin off by up to this much, m and rad.
-fn torso(error: f64, seed: u64) -> String {
+pub fn torso(error: f64, seed: u64) -> String {
+    torso_with(error, seed, ("", [0.0; 3]))
+}
+
+/// The same where the origin of one joint moved.
+pub fn torso_with(error: f64, seed: u64, (moved, by): (&str, [f64; 3])) -> String {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let mut text = "<robot name=\"torso\">\n  <link name=\"base\"/>\n".to_owned();
     let mut joint = |name: &str, parent: &str, axis: &str, origin: [f64; 3]| {
         let mut off = || -> f64 { error * rng.random_range(-1.0..1.0) };
-        let [x, y, z] = origin.map(|c| c + off());
+        let mut at = origin.map(|c| c + off());
+        if name == moved {
+            at.iter_mut().zip(by).for_each(|(c, by)| *c += by);
+        }
+        let [x, y, z] = at;
         let [r, p, w] = [off(), off(), off()];
         text += &format!(
             "  <link name=\"{name}_link\"/>\n  <joint name=\"{name}\" type=\"revolute\">\n    <parent link=\"{parent}\"/>\n    <child link=\"{name}_link\"/>\n    \
@@ -47,8 +56,43 @@ fn torso(error: f64, seed: u64) -> String {
     text + "</robot>\n"
 }
 
+/// What is special about a table.
+#[derive(Clone, Copy)]
+pub struct Special<'a> {
+    /// A column that stays from the middle on.
+    pub frozen: Option<&'a str>,
+    /// σ of the readings, rad.
+    pub joint_noise: f64,
+    /// A joint that stands further than it is read, rad.
+    pub zero: (&'a str, f64),
+    /// A body that is elsewhere on its link, along its x axis, m.
+    pub body: (&'a str, f64),
+    /// How far the tracker moved along its x axis, m.
+    pub tracker: f64,
+}
+
+impl Special<'_> {
+    pub const NOTHING: Self = Self {
+        frozen: None,
+        joint_noise: 0.0,
+        zero: ("", 0.0),
+        body: ("", 0.0),
+        tracker: 0.0,
+    };
+}
+
 /// A table whose column of `frozen` stays from the middle on.
 fn table(robot: &RobotModel, frozen: Option<&str>, rows: usize, seed: u64) -> String {
+    let special = Special {
+        frozen,
+        ..Special::NOTHING
+    };
+    table_with(robot, &special, rows, seed)
+}
+
+/// Random postures of both arms, with three bodies.
+pub fn table_with(robot: &RobotModel, special: &Special<'_>, rows: usize, seed: u64) -> String {
+    let frozen = special.frozen;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     let tracker_from_root = Isometry3::from_parts(
         Translation3::new(0.9, 0.3, 0.1),
@@ -77,7 +121,17 @@ fn table(robot: &RobotModel, frozen: Option<&str>, rows: usize, seed: u64) -> St
             read[at] = held;
         }
         let mut cells: Vec<String> = read.iter().map(|q| format!("{q:.6}")).collect();
-        for (_, link) in bodies {
+        let mut stands = q.clone();
+        for (q, name) in stands.iter_mut().zip(&names) {
+            if special.joint_noise > 0.0 {
+                let n: f64 = StandardNormal.sample(&mut rng);
+                *q += special.joint_noise * n;
+            }
+            if name == special.zero.0 {
+                *q += special.zero.1;
+            }
+        }
+        for (body, link) in bodies {
             let mut noise = |sigma: f64| {
                 let n: f64 = StandardNormal.sample(&mut rng);
                 sigma * n
@@ -86,8 +140,15 @@ fn table(robot: &RobotModel, frozen: Option<&str>, rows: usize, seed: u64) -> St
                 Translation3::new(noise(2e-4), noise(2e-4), noise(2e-4)),
                 UnitQuaternion::from_euler_angles(noise(1e-3), noise(1e-3), noise(1e-3)),
             );
-            let seen = tracker_from_root
-                * robot.root_from_link(&q, robot.link_id(link).expect("there"))
+            let by = if body == special.body.0 {
+                special.body.1
+            } else {
+                0.0
+            };
+            let seen = Translation3::new(special.tracker, 0.0, 0.0)
+                * tracker_from_root
+                * robot.root_from_link(&stands, robot.link_id(link).expect("there"))
+                * Translation3::new(by, 0.0, 0.0)
                 * noise;
             let values = seen
                 .translation

@@ -156,6 +156,7 @@ pub use analysis::gauge::Gauge;
 pub use analysis::gear_ratio::GearRatio;
 pub use analysis::goodness::{GoodnessOfFit, Physics, ScoreTest};
 pub use analysis::information::{Information, NULL_TOLERANCE};
+pub use analysis::moved_before::{Displaced, HeldOutMotion, HeldOutMotions, PlaceOf};
 pub use analysis::observability::{Direction, Observability, Term};
 pub use analysis::sandwich::sandwich;
 pub use analysis::select::{

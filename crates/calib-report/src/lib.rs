@@ -97,9 +97,10 @@ pub use selection::{
 pub use standardized::{Standardized, Tails};
 pub use svg::picture;
 pub use verdict::{
-    Agreement, Compared, Effect, FoundNoise, Goodness, ImplausibleChange, Improvement, Judgment,
-    Orientation, Part, Predicted, Prediction, Reason, ReasonId, RejectedPart, Share, SingleJoint,
-    Solver, UnseenBody, Untested, UntestedKind, UrdfAlone, Validation, VerdictFacts, judge,
+    Agreement, BodyError, Compared, Effect, FoundNoise, Goodness, ImplausibleChange, Improvement,
+    Judgment, Orientation, Part, Predicted, Prediction, Reason, ReasonId, RejectedPart, Share,
+    SingleJoint, Solver, UnseenBody, Untested, UntestedKind, UrdfAlone, Validation, VerdictFacts,
+    judge,
 };
 pub use verification::{AngleStats, ErrorStats, LoopClosure, LoopGroup, Stats, Verification};
 pub use view3d::View3d;

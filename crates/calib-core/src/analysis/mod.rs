@@ -22,6 +22,7 @@ mod less_noise;
 mod levels_found;
 mod likelier;
 mod looked_at;
+pub(crate) mod moved_before;
 pub(crate) mod observability;
 mod own_levels;
 mod posture;

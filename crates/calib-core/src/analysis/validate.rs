@@ -158,7 +158,7 @@ impl Solution {
 
     /// w of the held-out observations, so that V/w is their covariance; 0 of all others. Where one kind of noise grows more than another,
     /// the whole observation counts as that.
-    fn held_out_weights(&self, level: Level<'_>) -> Vec<f64> {
+    pub(crate) fn held_out_weights(&self, level: Level<'_>) -> Vec<f64> {
         let model = &self.model;
         let weight = |(o, observation): (usize, &Observation)| {
             if !model.is_held_out(observation.sample) {

@@ -111,6 +111,9 @@ super::topic! {
         "held_out": Error,
             "The errors in {recordings:code} are {none} per coordinate, but only {best} if the tracker, or the whole robot, moved by {distance} ± {sigma} and {angle} before.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
             "Record the validation again without moving the tracker or the robot's base between it and the fitted recordings.";
+        "displaced": Error,
+            "In {recordings:code} the tracker, or the whole robot, stands {distance} ± {sigma}[[ and {angle}]] away from where it stood in the fitted recordings; the held-out error is {rms} rms. With this taken into account, χ²/dof of these errors is {after} in place of {before}.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
+            "Record the validation again without moving the tracker or the robot's base between it and the fitted recordings.";
     }
     /// A body has another mount in some recordings.
     BODY_REMOUNTED = "body-remounted" {
@@ -120,6 +123,9 @@ super::topic! {
         "held_out": Error,
             "The errors in {recordings:code} are {none} per coordinate, but only {best} if body `{body}` moved on its link by {distance} ± {sigma}[[ and {angle}]] before.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
             "Record the validation again without remounting the body between it and the fitted recordings.";
+        "displaced": Error,
+            "In {recordings:code} body `{body}` is {distance} ± {sigma}[[ and {angle}]] away on its link from where it was in the fitted recordings; its held-out error is {rms} rms. With this taken into account, χ²/dof of these errors is {after} in place of {before}.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
+            "Fasten the body, and record the validation again, or everything.";
     }
     /// A joint's zero is another one in held-out recordings.
     JOINT_ZERO_CHANGED = "joint-zero-changed" {
@@ -129,6 +135,15 @@ super::topic! {
         "several": Error,
             "The errors in {recordings:code} are {none} per coordinate, but only {best} if the zeros of joints {joints:code} changed before, most clearly that of `{joint}`: by {step} ± {sigma}.",
             "If the robot was homed or its controller restarted in between, its zeros are those of one homing: record everything after one homing. Otherwise check the encoders and couplings of these joints.";
+        "displaced": Error,
+            "In {recordings:code} the zero of joint `{joint}` is {step} ± {sigma} away from that of the fitted recordings; the held-out error of what follows the joint is {rms} rms. With this taken into account, χ²/dof of these errors is {after} in place of {before}.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
+            "Check the encoder of joint `{joint}`, its coupling, how it is homed and, where a recording states its value, this value. If its zero changed, record the fitted recordings again as well: they are of the robot as it was.";
+    }
+    /// What follows a joint is at another place on the link before it.
+    JOINT_ORIGIN_MOVED = "joint-origin-moved" {
+        "": Error,
+            "In {recordings:code} everything that follows joint `{joint}` is {distance} ± {sigma}[[ and {angle}]] away on link `{link}` from where it was in the fitted recordings; its held-out error is {rms} rms. With this taken into account, χ²/dof of these errors is {after} in place of {before}.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
+            "Look for loose screws and for damage where joint `{joint}` is mounted on link `{link}`, and ask for collisions between the recordings. Then record everything again: the fitted recordings are of the robot as it was.";
     }
     /// Tracker and joints were read at different times.
     CLOCK_LAG = "clock-lag" {

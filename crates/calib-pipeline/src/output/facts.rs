@@ -7,8 +7,8 @@ use calib_finding::{Finding, Severity, catalog};
 use calib_geometry::statistics::median;
 use calib_profile::Usage;
 use calib_report::{
-    FoundNoise, Goodness, HeldOut, ImplausibleChange, Improvement, Limit, Orientation, Share,
-    SingleJoint, Solver, Unit, UrdfAlone, Validation, VerdictFacts,
+    BodyError, FoundNoise, Goodness, HeldOut, ImplausibleChange, Improvement, Limit, Orientation,
+    Share, SingleJoint, Solver, Unit, UrdfAlone, Validation, VerdictFacts,
 };
 use nalgebra::UnitVector3;
 
@@ -20,7 +20,8 @@ use crate::output::counts::{Tracks, rejected_parts, rejected_share};
 use crate::output::evidence::{Evidence, fit_end};
 use crate::output::of_fit::{stated_sigma, unit};
 use crate::output::open;
-use crate::verify::accuracy::{ToolBody, tool_bodies};
+use crate::prepare::inputs::Inputs;
+use crate::verify::accuracy::{ToolBody, body_of, tool_bodies};
 use crate::verify::agreement::agreement;
 use crate::verify::motions::Motions;
 use crate::verify::tracker_noise::recording_of;
@@ -39,6 +40,9 @@ pub(crate) fn facts(
     let undetermined = undetermined.filter(|(_, origin)| origin.pose.is_none() && e.fit.is_none());
     VerdictFacts {
         limits: limits.to_vec(),
+        of_bodies: held_out
+            .filter(|h| !h.left_out)
+            .map_or_else(Vec::new, |h| of_bodies(e.inputs, h)),
         solver: e.fit.map(|fit| Solver {
             ended: fit_end(fit),
             iterations: fit.solution.iterations,
@@ -85,6 +89,24 @@ pub(crate) fn facts(
             .and_then(|fit| agreement(e.inputs, fit, held_out))
             .map(|(agreement, _)| agreement),
     }
+}
+
+/// Held-out errors body by body, where several were seen.
+fn of_bodies(inputs: &Inputs, held_out: &HeldOut) -> Vec<BodyError> {
+    let of_body = |name: &String| {
+        let is_of = |subject: &str| {
+            body_of(inputs, subject).is_some_and(|(of_subject, _)| of_subject == name)
+        };
+        let found = held_out.expected_of(is_of)?;
+        Some(BodyError {
+            name: name.clone(),
+            rms: found.rms_m,
+            interval: (found.low_m, found.high_m),
+        })
+    };
+    let names = inputs.robot.profile.bodies.keys();
+    let all: Vec<BodyError> = names.filter_map(of_body).collect();
+    if all.len() > 1 { all } else { Vec::new() }
 }
 
 /// The patched URDF without effects, beside the calibrated robot.

@@ -202,11 +202,11 @@ fn rows_by_label(inputs: &Inputs) -> BTreeMap<String, &Vec<f64>> {
 }
 
 /// The body that a held-out error is of: by its own name, or by a marker's.
-fn body_of<'a>(inputs: &'a Inputs, subject: &String) -> Option<(&'a String, &'a Body)> {
+pub(crate) fn body_of<'a>(inputs: &'a Inputs, subject: &str) -> Option<(&'a String, &'a Body)> {
     let mut bodies = inputs.robot.profile.bodies.iter();
     bodies.find(|(name, body)| {
         *name == subject
-            || matches!(&body.kind, BodyKind::Markers { names, .. } if names.contains(subject))
+            || matches!(&body.kind, BodyKind::Markers { names, .. } if names.iter().any(|name| name == subject))
     })
 }
 

@@ -10,6 +10,7 @@ pub mod changes;
 pub mod closure;
 pub mod deviations;
 pub(crate) mod dh_table;
+mod displaced;
 mod elimination;
 mod gains;
 pub mod hayati;
@@ -134,6 +135,8 @@ pub fn verified(
     verified.findings.extend(scatter);
     let gain = fit.and_then(|fit| gains::of_held_out(inputs, checked, fit, &verified));
     verified.findings.extend(gain);
+    let displaced = fit.map(|fit| displaced::displaced(inputs, fit, &verified));
+    verified.findings.extend(displaced.unwrap_or_default());
     if let Some(changed) = verified.causes.change.clone() {
         verified.findings = one_cause(changed, verified.findings);
     }

@@ -93,6 +93,16 @@ impl HeldOut {
         }
     }
 
+    /// The error to expect of some subjects alone, from at least two postures that show them.
+    #[must_use]
+    pub fn expected_of(&self, is_one: impl Fn(&str) -> bool) -> Option<ExpectedError> {
+        let kept = self.poses.iter();
+        let kept: Vec<&PoseError> = kept
+            .filter(|pose| !pose.screened && is_one(&pose.subject))
+            .collect();
+        expected(&kept)
+    }
+
     /// Summarize the poses: [`ErrorStats`] per model over the poses that have it, the expected error with its 95 % interval, the worst pose.
     ///
     /// Screened errors are counted and left out of every statistic but `with_screened`.
@@ -122,16 +132,7 @@ impl HeldOut {
             &by_posture(&kept, |pose| pose.calibrated_rad.map(|angle| vec![angle])),
             CONFIDENCE,
         );
-        let expected =
-            interval(&by_posture(&kept, position), CONFIDENCE).map(|found| ExpectedError {
-                rms_m: found.rms,
-                low_m: found.low,
-                high_m: found.high,
-                confidence: CONFIDENCE,
-                postures: found.postures,
-                tracker_m: None,
-                degrees_of_freedom: Some(found.freedom).filter(|nu| nu.is_finite()),
-            });
+        let expected = expected(&kept);
         Self {
             n: kept.len(),
             postures: postures.len(),
@@ -154,6 +155,20 @@ impl HeldOut {
             left_out_over_all: None,
         }
     }
+}
+
+/// The error to expect, from these errors.
+fn expected(kept: &[&PoseError]) -> Option<ExpectedError> {
+    let found = interval(&by_posture(kept, position), CONFIDENCE)?;
+    Some(ExpectedError {
+        rms_m: found.rms,
+        low_m: found.low,
+        high_m: found.high,
+        confidence: CONFIDENCE,
+        postures: found.postures,
+        tracker_m: None,
+        degrees_of_freedom: Some(found.freedom).filter(|nu| nu.is_finite()),
+    })
 }
 
 /// The calibrated error of a pose as a vector; where only its length is known, as if all lay along one line.

@@ -11,6 +11,8 @@ use crate::{FitEnd, Limit, Unit};
 pub struct Facts {
     /// The limits of the profile against what was measured.
     pub limits: Vec<Limit>,
+    /// Held-out errors of each body, where there are several.
+    pub of_bodies: Vec<BodyError>,
     /// How the solver ended; `None` with the closed forms.
     pub solver: Option<Solver>,
     /// Origins that the profile asks for and that were not determined.
@@ -49,6 +51,17 @@ pub struct Facts {
     pub prediction: Option<Prediction>,
     /// Held-out errors against what is stated of them; `None` without.
     pub agreement: Option<Agreement>,
+}
+
+/// Held-out position errors of one body.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct BodyError {
+    /// Its name.
+    pub name: String,
+    /// rms, m.
+    pub rms: f64,
+    /// 95 % interval of the rms, m.
+    pub interval: (f64, f64),
 }
 
 /// A body that the fit used and no held-out pose shows.

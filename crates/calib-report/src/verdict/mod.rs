@@ -12,7 +12,7 @@ mod rules;
 
 pub use compare::{Improvement, Quantity as Compared};
 pub use facts::{
-    Agreement, Change as ImplausibleChange, Facts as VerdictFacts, FoundNoise, Goodness,
+    Agreement, BodyError, Change as ImplausibleChange, Facts as VerdictFacts, FoundNoise, Goodness,
     Orientation, Part, Predicted, Prediction, RejectedPart, Share, SingleJoint, Solver, UnseenBody,
     Untested, UntestedKind, UrdfAlone, Validation,
 };

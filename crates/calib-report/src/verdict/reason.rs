@@ -64,6 +64,8 @@ reasons! {
     LimitNotEvaluated = "limit-not-evaluated": LeavesOpen,
     /// The estimate is within a limit, the upper end of its interval is not.
     LimitUndecided = "limit-undecided": LeavesOpen,
+    /// Of one of several bodies, the interval lies above a limit that all bodies together do not exceed.
+    BodyAboveLimit = "body-above-limit": LeavesOpen,
     /// Over the joint ranges the upper limit of the expected error is above a limit of the profile.
     PredictionUndecided = "prediction-undecided": Warns | LeavesOpen,
     /// The same with an effect that the model does not have and that the data do not exclude.

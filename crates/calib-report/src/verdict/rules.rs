@@ -13,10 +13,11 @@ use crate::verdict::{Effect, Reason};
 pub type Rule = fn(&Facts) -> Vec<Reason>;
 
 /// Every rule. What each asks for stands in the book, by the ids of its reasons.
-pub const RULES: [Rule; 22] = [
+pub const RULES: [Rule; 23] = [
     of_fit::converged,
     of_fit::origins,
     of_errors::limits,
+    of_errors::bodies,
     of_errors::registration,
     of_data::rejected_parts,
     of_errors::orientation,

@@ -251,6 +251,13 @@ fn of_reason(report: &Report, id: &str, again: &str) -> Option<[String; 2]> {
                 code(body.unwrap_or("every body"))
             )
         }
+        ReasonId::BodyAboveLimit => {
+            let body = reason.values.get("body").and_then(Fact::word);
+            format!(
+                "Look at the poses of {} with the largest errors in the report, and record more fitted poses in which the joints that carry it move; then run `{again}`.",
+                code(body.unwrap_or("this body"))
+            )
+        }
         ReasonId::TooFewToCompare => {
             format!("Record at least five validation poses, then run `{again}`.")
         }

@@ -93,6 +93,7 @@ impl Reason {
             | ReasonId::LimitExceeded
             | ReasonId::LimitUndecided
             | ReasonId::LimitNotEvaluated
+            | ReasonId::BodyAboveLimit
             | ReasonId::NoLimits => of_limit(self, &v),
             ReasonId::NotConverged
             | ReasonId::OriginNotDetermined
@@ -160,6 +161,11 @@ fn of_limit(reason: &Reason, v: &Values<'_>) -> String {
                 v.number("value")
             )
         }
+        ReasonId::BodyAboveLimit => format!(
+            "Of body {} alone, the held-out rms error is {}{interval}, above the limit {limit} that all bodies together do not exceed.",
+            v.code("body"),
+            v.number("value")
+        ),
         ReasonId::LimitExceeded => format!(
             "{quantity}: {}{interval}, limit {limit} (exceeded).",
             v.number("value")

@@ -1,9 +1,9 @@
 //! Facts that the verdict is given from: those against which nothing speaks, and for every rule those that break it.
 
 use calib_report::{
-    Agreement, Compared, Effect, FitEnd, FoundNoise, Goodness, ImplausibleChange, Improvement,
-    Limit, Limited, Orientation, Part, Predicted, Prediction, ReasonId, RejectedPart, Share,
-    SingleJoint, Solver, Unit, UnseenBody, Untested, UntestedKind, UrdfAlone, Validation,
+    Agreement, BodyError, Compared, Effect, FitEnd, FoundNoise, Goodness, ImplausibleChange,
+    Improvement, Limit, Limited, Orientation, Part, Predicted, Prediction, ReasonId, RejectedPart,
+    Share, SingleJoint, Solver, Unit, UnseenBody, Untested, UntestedKind, UrdfAlone, Validation,
     VerdictFacts,
 };
 
@@ -574,6 +574,11 @@ pub(crate) fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
                 f.warnings = vec!["unsettled-rows".into()];
             }),
         ),
+        (
+            ReasonId::BodyAboveLimit,
+            LeavesOpen,
+            with(|f| f.of_bodies = vec![of_body(0.0004, 0.0005), of_body(0.0012, 0.0014)]),
+        ),
         (ReasonId::UrdfAlone, Supports, alone(0.0009, Some(0.001))),
         (ReasonId::UrdfAlone, Warns, alone(0.0011, Some(0.001))),
         (ReasonId::UrdfAlone, Supports, alone(0.0005, None)),
@@ -601,6 +606,15 @@ pub(crate) fn broken() -> Vec<(ReasonId, Effect, VerdictFacts)> {
     ];
     out.extend(open);
     out
+}
+
+/// Held-out errors of a body with the lower end of its interval.
+pub(crate) fn of_body(low: f64, rms: f64) -> BodyError {
+    BodyError {
+        name: "tool".into(),
+        rms,
+        interval: (low, 2.0 * rms),
+    }
 }
 
 pub(crate) fn unseen(joints: &[&str], remounted: bool) -> UnseenBody {

@@ -2,7 +2,7 @@
 
 use calib_finding::Fact;
 
-use crate::verdict::facts::{Facts, Validation};
+use crate::verdict::facts::{BodyError, Facts, Validation};
 use crate::verdict::{Compared, Effect, Improvement, Reason, ReasonId};
 use crate::{Limit, Outcome, Unit};
 
@@ -41,6 +41,28 @@ pub(super) fn limits(facts: &Facts) -> Vec<Reason> {
             )
     };
     facts.limits.iter().map(reason).collect()
+}
+
+/// A limit of the rms error is one of every body: a body alone can be above what all of them together meet.
+pub(super) fn bodies(facts: &Facts) -> Vec<Reason> {
+    let is_rms = |l: &&Limit| l.unit == Unit::Meter && l.name.starts_with("held_out_rms");
+    let mut limits = facts.limits.iter().filter(is_rms);
+    let Some(limit) = limits.find(|limit| limit.outcome != Outcome::Exceeded) else {
+        return Vec::new();
+    };
+    let above = facts
+        .of_bodies
+        .iter()
+        .filter(|body| body.interval.0 > limit.limit);
+    let reason = |body: &BodyError| {
+        Reason::new(ReasonId::BodyAboveLimit, Effect::LeavesOpen)
+            .with("body", Fact::name(&body.name))
+            .with("value", Fact::meters(body.rms))
+            .with("low", Fact::meters(body.interval.0))
+            .with("high", Fact::meters(body.interval.1))
+            .with("limit", Fact::meters(limit.limit))
+    };
+    above.map(reason).collect()
 }
 
 /// Postures of which an estimate like this one would have its whole interval on its side of the limit: its half-width shrinks

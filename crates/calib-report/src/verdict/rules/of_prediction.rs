@@ -80,8 +80,9 @@ fn of_effect(reason: Reason, what: &Untested) -> Reason {
 }
 
 /// Findings of what changed before the validation: its errors are then no measure of what the fit states.
-const CHANGED_BEFORE: [Id; 3] = [
+const CHANGED_BEFORE: [Id; 4] = [
     catalog::JOINT_ZERO_CHANGED,
+    catalog::JOINT_ORIGIN_MOVED,
     catalog::TRACKER_MOVED,
     catalog::BODY_REMOUNTED,
 ];
