@@ -17,6 +17,7 @@ mod laws;
 mod limits;
 mod long;
 mod memory;
+mod moved_before;
 mod noise;
 mod own_levels;
 mod posture;
