@@ -16,6 +16,7 @@ use std::collections::BTreeSet;
 
 use nalgebra::{DMatrix, DVector, Isometry3, Vector6};
 
+use crate::analysis::looked_at::looked_at;
 use crate::analysis::solution::Solution;
 use crate::analysis::validate::Level;
 use crate::graph::ids::{EdgeId, FrameId};
@@ -74,6 +75,9 @@ pub struct HeldOutMotions {
     pub motions: Vec<Option<HeldOutMotion>>,
 }
 
+/// Samples that are looked at, at most: a motion of a tenth of the noise of one is then 3 σ.
+const MOST: usize = 1000;
+
 /// Sums over samples.
 struct Sums {
     h: DMatrix<f64>,
@@ -87,8 +91,8 @@ struct Sums {
 }
 
 impl Solution {
-    /// Equation (3) for every motion, over all held-out samples but those of `without`; levels as of [`Self::held_out_at`]. `None` where
-    /// nothing is held out, or the model cannot be evaluated.
+    /// Equation (3) for every motion, over the held-out samples but those of `without`; levels as of [`Self::held_out_at`]. Of long recordings some
+    /// samples are taken, as if no others had been made. `None` where nothing is held out, or the model cannot be evaluated.
     #[must_use]
     pub fn held_out_motions(
         &self,
@@ -117,8 +121,16 @@ impl Solution {
             rows: 0,
             samples: 0,
         };
-        let kept = |sample: &&usize| !without.contains(*sample);
-        for &sample in model.problem.held_out.iter().filter(kept) {
+        let kept = |sample: &usize| !without.contains(sample);
+        let kept: Vec<usize> = model
+            .problem
+            .held_out
+            .iter()
+            .copied()
+            .filter(kept)
+            .collect();
+        let looked_at = looked_at(&kept, &model.problem.borders, MOST);
+        for sample in looked_at.samples {
             let Some(s) = whitened(objective, &self.values, sample, &mut work) else {
                 continue;
             };

@@ -142,7 +142,7 @@ super::topic! {
     /// What follows a joint is at another place on the link before it.
     JOINT_ORIGIN_MOVED = "joint-origin-moved" {
         "": Error,
-            "In {recordings:code} everything that follows joint `{joint}` is {distance} ± {sigma}[[ and {angle}]] away on link `{link}` from where it was in the fitted recordings; its held-out error is {rms} rms. With this taken into account, χ²/dof of these errors is {after} in place of {before}.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
+            "In {recordings:code} everything that follows joint `{joint}` is {distance} ± {sigma}[[ and {angle}]] away on link `{link}` from where it was in the fitted recordings; the held-out error of what follows the joint is {rms} rms. With this taken into account, χ²/dof of these errors is {after} in place of {before}.[[ These recordings do not distinguish it from {equivalent:code}.]][[ A changed zero of {joints:or} explains it as well.]]",
             "Look for loose screws and for damage where joint `{joint}` is mounted on link `{link}`, and ask for collisions between the recordings. Then record everything again: the fitted recordings are of the robot as it was.";
     }
     /// Tracker and joints were read at different times.

@@ -5,11 +5,12 @@
 //! and what the fit states of them ([`calib_core::Solution::held_out_motions`]), where nothing else explains them:
 //!
 //! ```text
-//! T = h ln(F / (F − Δ)) − k ln h        the best counts
-//! (Δ/k) / ((F − Δ)/(h − k))  ~  F(k, h − k)
+//! T = Δ/s² − k ln h,   s² = max(1, (F − Δ)/(h − k) of the largest Δ)        the best counts
+//! (Δ/k) / s²  ~  F(k, h − k)
 //! ```
 //!
-//! h numbers, k unknowns. It is named where chance makes it so large in one of 10⁵ validations, where it explains a tenth of the errors or more, and
+//! h numbers, k unknowns. Errors that are smaller than stated, as of means where rows are expected, are no reason to take what the parameters leave
+//! open for smaller: s² is at least 1. A motion is named where chance makes it so large in one of 10⁵ validations, where it explains a tenth of the errors or more, and
 //! where what it leaves agrees with what the fit states: errors of a model that lacks something have a part in common as well.
 
 use std::collections::{BTreeMap, BTreeSet};
@@ -100,19 +101,20 @@ fn of_recording(
         places.at(*link, samples[sample].1) * on_link
     };
     let levels = HeldOutLevels::of(inputs, samples);
-    let level = |_, kind, found| levels.level(loaded, kind, found);
+    let level_of = |_, kind, found| levels.level(loaded, kind, found);
     let asked: Vec<Displaced> = candidates.iter().map(|c| c.displaced.clone()).collect();
     let found = fit
         .solution
-        .held_out_motions(&without, &level, &asked, &place)?;
+        .held_out_motions(&without, &level_of, &asked, &place)?;
     if found.samples < POSTURES {
         return None;
     }
     let h = found.rows as f64;
-    let t = |motion: &HeldOutMotion| {
-        let left = (found.chi2 - motion.explains).max(f64::MIN_POSITIVE);
-        h * (found.chi2 / left).ln() - motion.unknowns * h.ln()
-    };
+    let all = || found.motions.iter().flatten();
+    let largest = all().map(|m| m.explains).fold(0.0, f64::max);
+    let unknowns = all().map(|m| m.unknowns).fold(0.0, f64::max);
+    let level = ((found.chi2 - largest) / (h - unknowns).max(1.0)).max(1.0);
+    let t = |motion: &HeldOutMotion| motion.explains / level - motion.unknowns * h.ln();
     let tried = candidates.iter().zip(&found.motions);
     let tried = tried.filter_map(|(c, motion)| Some((c, motion.as_ref()?, t(motion.as_ref()?))));
     let mut tried: Vec<Tried<'_>> = tried.collect();
@@ -126,7 +128,7 @@ fn of_recording(
     let before = Agreement::of(found.chi2, found.rows, freedom);
     let left = found.chi2 - best.1.explains;
     let after = Agreement::of(left, found.rows, freedom);
-    let is_named = chance(best.1, left, h) * (candidates.len() as f64) < CHANCE
+    let is_named = chance(best.1, level, h) * (candidates.len() as f64) < CHANCE
         && best.1.explains > SHARE * found.chi2
         && !after.is_beyond();
     if !is_named {
@@ -145,9 +147,9 @@ fn of_recording(
 }
 
 /// Chance of an explanation so large.
-fn chance(motion: &HeldOutMotion, left: f64, h: f64) -> f64 {
+fn chance(motion: &HeldOutMotion, level: f64, h: f64) -> f64 {
     let (k, rest) = (motion.unknowns, h - motion.unknowns);
-    let value = (motion.explains / k) / (left / rest);
+    let value = motion.explains / k / level;
     let of = FisherSnedecor::new(k, rest);
     of.map_or(1.0, |of| of.sf(value.max(0.0)))
 }
